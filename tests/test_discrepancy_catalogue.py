@@ -84,15 +84,18 @@ def test_a_gap_with_two_different_sides_is_named():
 
 
 @pytest.mark.slow
-def test_cogging_is_named_with_its_pitch():
+@pytest.mark.parametrize("pitch", [0.012, 0.004])
+def test_cogging_is_named_with_its_pitch(pitch):
+    """Some seven teeth in the stroke, and twenty, of which a sample at full speed passes over more than one."""
+
     def teeth(x, v, z):
-        return 1.5 * math.sin(2.0 * math.pi * x / 0.012), []
+        return 1.5 * math.sin(2.0 * math.pi * x / pitch), []
 
     verdict = named(
         planted_case(lambda f: motion_with(f, teeth)), "cogging", "cubic_stiffness", "coulomb_friction", "gap"
     )
     assert [e.name for e in verdict.named] == ["cogging"]
-    assert estimate(verdict, "period") == pytest.approx(0.012, rel=0.02)  # over some five teeth
+    assert estimate(verdict, "period") == pytest.approx(pitch, rel=0.02)
     assert estimate(verdict, "sine") == pytest.approx(1.5, rel=0.05)
 
 

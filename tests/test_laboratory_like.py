@@ -16,6 +16,7 @@ SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 sys.path.insert(0, str(SCRIPTS))
 
 from laboratory.made import STEP, march, unstated  # noqa: E402
+from laboratory.structures import STRUCTURES  # noqa: E402
 from laboratory_like import OSCILLATORS, prescribed  # noqa: E402
 
 
@@ -50,5 +51,5 @@ def test_a_case_of_which_the_noise_is_not_stated_is_read_as_one(tmp_path):
 
 def test_what_is_right_has_a_name_of_the_catalogue():
     known = {effect.name for effect in CATALOGUE}
-    for made in OSCILLATORS:
+    for made in (*OSCILLATORS, *STRUCTURES):
         assert known >= {*made.also, *(name for group in made.right for name in group)}, made.name

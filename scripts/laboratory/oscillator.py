@@ -27,6 +27,7 @@ class Oscillator:
         read: What the sensors make of displacement and acceleration.
         channels: Responses that were recorded.
         mass: Stated mass [kg].
+        count: Step of the displacement [m] as it is logged; none where zero.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Oscillator:
     read: Callable[[Array, Array], tuple[Array, Array]] = lambda x, a: (x, a)
     channels: Sequence[str] = ("displacement", "acceleration")
     mass: float = 2.0
+    count: float = 0.0
 
     def made(self, rng: np.random.Generator) -> Made:
         """Its case."""
@@ -70,6 +72,8 @@ class Oscillator:
             noisy(rng, {"force": load[:, i], "displacement": x[:, i], "acceleration": a[:, i]}, noise)
             for i in range(3)
         ]
+        for record in records if self.count else ():
+            record["displacement"] = self.count * np.round(record["displacement"] / self.count)
         channels = {
             c: (units[c], "measured" if c == "force" else "response", noise[c])
             for c in ("force", *self.channels)

@@ -15,11 +15,6 @@ def wandering(x: Array) -> Array:
     return x + 2e-3 * part * np.sqrt(part)
 
 
-def on_steps(x: Array) -> Array:
-    """Displacements as an encoder of 0.2 mm a count has them."""
-    return 2e-4 * np.round(x / 2e-4)
-
-
 def with_mains(a: Array) -> Array:
     """Accelerations with hum of the mains and its third harmonic."""
     time = STEP * np.arange(len(a))[:, None]
@@ -50,15 +45,15 @@ STRUCTURES = (
     ),
     Oscillator(
         "pole_pitch", [["cogging"]], "cogging of a linear motor, with its second harmonic",
-        extra=lambda x, v, z: 2.0 * np.sin(2.0 * np.pi * x / 0.006) + 0.5 * np.sin(4.0 * np.pi * x / 0.006 + 0.7),
+        extra=lambda x, v, z: 2.0 * np.sin(2.0 * np.pi * x / 0.012) + 0.5 * np.sin(4.0 * np.pi * x / 0.012 + 0.7),
     ),
     Oscillator(
         "back_emf", [["damping_error"]], "a motor on a voltage: its own speed takes from the force that the log says",
         extra=lambda x, v, z: 5.0 * v,
     ),
     Oscillator(
-        "relaxing_mount", [["viscoelastic_relaxation"]], "a mount that relaxes the faster the further it is deflected",
-        extra=lambda x, v, z: 600.0 * z, memory=fractional, also=("stiffness_error", "damping_error"),
+        "relaxing_mount", [["viscoelastic_relaxation"]], "a mount that relaxes the slower the further it is deflected: it yields",
+        extra=lambda x, v, z: 600.0 * z, memory=fractional, also=("stiffness_error", "damping_error", "coulomb_friction"),
     ),
     Oscillator(
         "loose_guide", [["record_dependent_friction"]], "a guide whose preload was changed between the records",
@@ -70,7 +65,7 @@ STRUCTURES = (
     ),
     Oscillator(
         "coarse_encoder", [["displacement_quantisation"]], "nothing is missing from the mechanics: an encoder of 0.2 mm a count",
-        read=lambda x, a: (on_steps(x), a),
+        count=2e-4,
     ),
     Oscillator(
         "mains", [["acceleration_hum"]], "nothing is missing from the mechanics: hum on the accelerometer",
@@ -84,7 +79,7 @@ STRUCTURES = (
 
 def tank(rng: np.random.Generator) -> Made:
     """A fifth of the stated mass is liquid that sloshes, a pendulum of large swing."""
-    loads = multisines(rng, 20.0, 0.5, 15.0, (6.0, 12.0, 9.0))
+    loads = multisines(rng, 20.0, 0.5, 15.0, (1.0, 2.0, 1.5))
     part, omega, length = 0.4, 2.0 * np.pi * 2.4, 0.0431
 
     def rate(s: Array, u: Array) -> Array:

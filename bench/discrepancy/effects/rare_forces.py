@@ -142,7 +142,7 @@ RARER: tuple[Effect, ...] = (
                 "position",
                 mean=math.log(0.5),
                 std=0.7,
-                bounds=(math.log(0.05), math.log(1.5)),
+                bounds=(math.log(0.005), math.log(1.5)),
                 grid=log_grid(0.2, 0.3, 0.45, 0.8),
             ),
         ),

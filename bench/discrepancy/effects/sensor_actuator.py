@@ -150,7 +150,6 @@ CHANNELS: tuple[Effect, ...] = (
         "k = k_nominal (1 + e)",
         quantity="stiffness",
         exact=True,
-        log_prior=-2.0,
     ),
     Effect(
         "damping_error",
@@ -160,7 +159,6 @@ CHANNELS: tuple[Effect, ...] = (
         "c = c_nominal (1 + e)",
         quantity="damping",
         exact=True,
-        log_prior=-2.0,
     ),
     Effect(
         "actuator_delay",

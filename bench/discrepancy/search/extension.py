@@ -12,7 +12,7 @@ from bench.discrepancy.fitting.fits import Search, Task, carry_on, converge, lim
 from bench.discrepancy.fitting.goodness_of_fit import consistent, key_of
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.fitting.starts import Point
-from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.screening.candidates import (
@@ -163,6 +163,16 @@ def first_fit(problem: Problem, hypothesis: Hypothesis, start: np.ndarray, *, li
     settings = problem.settings.search
     iterations = settings.quick if hypothesis[-1].effect.site == "joint" else 2 * settings.quick
     return fit(problem, hypothesis, start=start, iterations=iterations, exact=False, limit=limit)
+
+
+def read_off(search: Search, screen: Screen, size: int, placed: Placed, eta: Array) -> None:
+    """Fit one more effect beside the best hypothesis that is one fewer, from parameters that were read off the records."""
+    base = next(f for f in search.ranked(size - 1) if all(p.key != placed.key for p in f.hypothesis))
+    named, along = base if base.hypothesis else None, tells_motion(base, search.problem)
+    local = about(screen, base, explained=along)
+    ground = local.ground(named, simulated=named is not None and along)
+    point = local.refine(Point(placed, 0.0, eta), ground)
+    converge(search, [((*base.hypothesis, placed), local.starts(point, ground, named))])
 
 
 def contacts(search: Search, candidates: Sequence[Placed]) -> None:

@@ -29,10 +29,11 @@ from bench.discrepancy.screening.candidates import (
 )
 from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.extension import contacts, extend
+from bench.discrepancy.search.extension import contacts, extend, read_off
 from bench.discrepancy.search.horizons import lengthen
 from bench.discrepancy.search.rivals import challenge, divide, reduce_best, simplify
 from bench.discrepancy.unscreened.analogue_lag import with_analogue_lag
+from bench.discrepancy.unscreened.fine_cogging import COGGING, fine_cogging
 from bench.discrepancy.unscreened.harmonic_force import with_harmonic_force
 from bench.discrepancy.unscreened.scheduled import with_schedules
 from bench.discrepancy.unscreened.sensor_hum import with_hum
@@ -88,6 +89,7 @@ def attribute(
             break
         extend(search, screen, bases, count=4 if consistent(best) else 6 - size)
         _with_variants(search, size + 1)
+        _with_fine_cogging(search, screen, candidates, size + 1)
         if HARMONIC in _read_off(candidates):
             with_harmonic_force(search, size + 1)
         with_hum(search, _read_off(candidates), size + 1)
@@ -129,6 +131,7 @@ def _single(
         progress("rarer effects")
         screen.add(rare)
         extend(search, screen, [nothing], count=6, among={p.key for p in rare})
+        _with_fine_cogging(search, screen, candidates, 1)
     stand_in(search)
     lengthen(search, 1, candidates)
     if deadline.allows("forces from outside and friction that follows a channel"):
@@ -145,6 +148,13 @@ def _with_variants(search: Search, size: int) -> None:
     """Fit what no screening tells from effects of the foremost hypotheses of a size: friction that creeps, a lag that is analogue."""
     soften(search, size)
     with_analogue_lag(search, size)
+
+
+def _with_fine_cogging(search: Search, screen: Screen, candidates: Sequence[Placed], size: int) -> None:
+    """Fit cogging of a pitch that no grid holds, where it is asked for and nothing explains the records yet."""
+    asked = any(p.effect.name == COGGING for p in candidates)
+    if asked and not consistent(search.ranked()[0]) and (found := fine_cogging(search.problem)) is not None:
+        read_off(search, screen, size, *found)
 
 
 def _read_off(candidates: Sequence[Placed]) -> set[str]:

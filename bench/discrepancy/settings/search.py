@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from bench.discrepancy.settings.describing import setting
 from bench.discrepancy.settings.search_parts import (
+    CoggingSettings,
     CoupledSettings,
     HarmonicForceSettings,
     HorizonSettings,
@@ -189,4 +190,5 @@ class SearchSettings:
     readings: LoadReadingSettings = field(default_factory=LoadReadingSettings)
     soft: SoftFrictionSettings = field(default_factory=SoftFrictionSettings)
     timed: TimedForceSettings = field(default_factory=TimedForceSettings)
+    cogging: CoggingSettings = field(default_factory=CoggingSettings)
     harmonic: HarmonicForceSettings = field(default_factory=HarmonicForceSettings)

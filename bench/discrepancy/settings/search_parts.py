@@ -148,6 +148,25 @@ class SoftFrictionSettings:
 
 
 @dataclass(frozen=True)
+class CoggingSettings:
+    """Cogging as a line in the spectrum of the missing force over the displacement."""
+
+    samples: float = setting(
+        2.0,
+        "Samples within the finest pitch that is looked for, at the RMS speed.",
+        "The force between two samples is lost; half of all motion is slower than that.",
+    )
+    finer: float = setting(
+        4.0,
+        "Points of that spectrum between two pitches that a stroke tells apart.",
+        "The lobe of a line is two wide.",
+    )
+    false_alarm: float = setting(
+        0.01, "Probability that noise has a line anywhere in it.", "A fit decides; it costs one."
+    )
+
+
+@dataclass(frozen=True)
 class HarmonicForceSettings:
     """A harmonic force of a frequency of its own, and hum in a reading: lines in the spectrum of what the records lack."""
 
