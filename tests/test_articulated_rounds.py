@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from test_articulated import LIMIT, NOISE, mjcf, problem_of, write_case
 
 from bench.discrepancy import diagnose, read_case
+from bench.discrepancy.articulated import explaining
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_judgement import judgement
 from bench.discrepancy.articulated_judgement.judgement import kept
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.misfit import Octaves, transformed
@@ -106,6 +110,32 @@ def test_what_showed_nothing_when_it_was_added_is_taken_out_again(tmp_path):
     assert [placed.key for placed in told.rungs[told.last].hypothesis] == [friction.key]
     assert told.predictions[told.last].discrepancy.max() < 100.0 * NOISE
     assert told.fits
+
+
+@pytest.mark.parametrize(("other", "kept_names"), [(0.9, {"b"}), (1.1, {"a", "b"})])
+def test_what_another_effect_has_made_idle_goes(monkeypatch, other, kept_names):
+    """Fitted without it, the judging records are left no larger; what was never fitted without is not asked."""
+    a, b = (SimpleNamespace(key=(name, "elbow"), joint=0) for name in "ab")
+    fits = [
+        SimpleNamespace(hypothesis=hypothesis, log_posterior=value)
+        for hypothesis, value in (((a, b), 5.0), ((b,), 3.0), ((b,), 2.0))
+    ]
+    left = {frozenset("ab"): 1.0, frozenset("b"): other}
+    monkeypatch.setattr(explaining, "twins", lambda nominal, joint: set())
+    monkeypatch.setattr(
+        explaining,
+        "predict",
+        lambda judging, fit, floor, settings: SimpleNamespace(
+            excess=np.array([left[frozenset(p.key[0] for p in fit.hypothesis)]])
+        ),
+    )
+    monkeypatch.setattr(judgement, "predict", explaining.predict)
+    problem = SimpleNamespace(
+        nominal=(), settings=SimpleNamespace(articulated=SimpleNamespace(judgement=None))
+    )
+    found = explaining._without_the_idle(problem, problem, fits, fits[0], np.zeros(1))
+    assert {placed.key[0] for placed in found.hypothesis} == kept_names
+    assert found.log_posterior == max(f.log_posterior for f in fits if f.hypothesis == found.hypothesis)
 
 
 def test_a_short_log_of_a_servo_is_diagnosed(tmp_path):

@@ -66,5 +66,7 @@ def test_further_effect_that_closes_nothing_for_sure_is_no_surer_than_even():
     assert [e.name for e in kept] == [e.name for e in named]
     assert [e.probability for e in kept] == [0.99, 0.99, 0.99, 0.5]
     assert (ranked[-1].name, ranked[-1].probability) == ("load_dependent_friction", 0.5)
+    small, _ = as_borne_out(named, ranking, least=0.05)
+    assert [e.probability for e in small] == [0.99, 0.5, 0.99, 0.5]
     alone = as_borne_out([effect("gap", -0.1, -0.2, 0.1)], [])[0]
     assert alone[0].probability == 0.99  # what is named at all is judged as a whole

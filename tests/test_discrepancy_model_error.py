@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_cases import MASS, NOISE, STIFFNESS, linear_motion, motion_with, planted_case
+from planted_cases import DAMPING, MASS, NOISE, STIFFNESS, linear_motion, motion_with, planted_case
 
 from bench.discrepancy import diagnose
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.fits import Search
 from bench.discrepancy.fitting.goodness_of_fit import complexity, leaves_much
 from bench.discrepancy.fitting.map_fit import fit
-from bench.discrepancy.judgement.coarse import Judged, bounded, judge, without
+from bench.discrepancy.judgement.coarse import Judged, _no_larger, bounded, judge, without
 from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
@@ -242,6 +242,21 @@ def test_an_effect_has_to_be_nearer_than_the_nominal_model_as_it_was_stated(judg
     assert not judged(0.6, 0.12, 0.1, 0.7)[1]  # parameters re-estimated without the effect had made it worse
 
 
+@pytest.mark.parametrize(
+    ("own", "theirs", "wins"), [(0.0105, 0.01, False), (0.02, 0.011, True), (0.5, 0.495, False)]
+)
+def test_judging_records_prefer_nothing_for_noise(monkeypatch, own, theirs, wins):
+    """What leaves noise alone is as good as anything; beyond it, more than a change that is none."""
+    problem = problem_of(case := planted_case(n=600))
+    named, rival = explanation(problem, "gap"), explanation(problem, "cubic_stiffness")
+    of = lambda self, e, *, judging: np.array([own if e is named else theirs])  # noqa: E731
+    monkeypatch.setattr(Discrepancies, "of", of)
+    known = Discrepancies(case, problem)
+    known._floor = np.array([0.01])
+    assert known.prefers(rival, named) == wins
+    assert not known.prefers(named, named)
+
+
 def test_nominal_parameters_stay_within_what_is_believed_whatever_is_taken_from_an_explanation():
     problem = problem_of(planted_case(n=600))
     kept = bounded(explanation(problem, "cubic_stiffness"), 4.0)
@@ -338,6 +353,13 @@ def test_what_is_small_may_be_one_of_the_small_things_of_every_rig():
     assert outside(0.0, besides=like_small_things(0.2)) == outside(0.0)
     assert outside(0.0, besides=likeness[0]) > 5.0 * outside(0.0)
     assert [stands_outside(size) for size in (0.02, 0.1, 0.15, 0.5)] == [False, False, True, True]
+
+
+def test_two_laws_of_one_number_each_are_held_against_one_of_three():
+    problem = problem_of(planted_case(n=600))
+    curved = explanation(problem, "stribeck_friction")
+    assert _no_larger(explanation(problem, "coulomb_friction", "quadratic_damping"), curved)
+    assert not _no_larger(explanation(problem, "coulomb_friction", "power_law_damping"), curved)
 
 
 def test_a_law_of_many_parameters_takes_more_to_be_described_than_two_of_one_each():
@@ -466,6 +488,23 @@ def test_a_mass_beyond_its_uncertainty_is_named_and_not_moved_in_silence():
     assert [e.name for e in verdict.named] == ["mass_error"]
     assert verdict.named[0].parameters["relative_error"].value == pytest.approx(0.29, abs=0.03)
     assert all(abs(p.shift_in_std) < 3.0 for p in verdict.nominal)
+
+
+@pytest.mark.slow
+def test_a_damper_that_is_off_is_a_number_and_no_relaxation():
+    """A quick relaxation is a damper over the whole band: the plainer one is named, and the other said to do as well."""
+
+    def damped(force):
+        return linear_motion(force, damping=4.0 * DAMPING)
+
+    names = ("damping_error", "viscoelastic_relaxation", "quadratic_damping", "coulomb_friction")
+    verdict = diagnose(
+        planted_case(damped, noise=UNSTATED), catalogue=[effect_named(name) for name in names]
+    ).verdict
+    assert [e.name for e in verdict.named] == ["damping_error"]
+    damping = next(p for p in verdict.nominal if p.name == "damping")
+    assert damping.value == pytest.approx(4.0 * DAMPING, rel=0.03)
+    assert verdict.indistinguishable == (("damping_error", "viscoelastic_relaxation"),)
 
 
 @pytest.mark.slow

@@ -199,7 +199,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     named = with_closed(case, problem, finding.named, explanations, rng) if finding.named else ()
     ranking = finding.ranking
     if named and not finding.coarse:
-        named, ranking = as_borne_out(named, ranking)
+        named, ranking = as_borne_out(named, ranking, least=problem.settings.likelihood.error.least)
     near = _nearest(case, problem, finding, closest, found, rng) if kind == "unknown" else {}
     ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *ranking)
     stated, sharp, nominal = problem.noise_stated, not finding.coarse, nominal_estimates(final)

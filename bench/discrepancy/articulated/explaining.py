@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bench.arrays import Array
 from bench.discrepancy.articulated.naming import left_of, verdict_of
 from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_judgement.judgement import (
@@ -146,7 +147,7 @@ def _explained(
     if not left.whole:
         fits += _with_dry_friction(problem, candidates, rungs[-1])
         near = alike(judged_by, fits, rungs[-1], predictions[-1], judged)
-        plain = simplest(fits, rungs[-1], near)
+        plain = _without_the_idle(problem, judged_by, fits, simplest(fits, rungs[-1], near), floor)
         if plain is not rungs[-1]:
             fits += predecessors(problem, plain, fits)
             rungs = ladder(problem, [plain, *fits])
@@ -160,6 +161,34 @@ def _explained(
         whole=left.whole, left=left_of(problem, rungs[-1], left.coloured, left.astray), alike=near,
     )  # fmt: skip
     return Explained(problem, judging, fits, rungs[-1], predictions, verdict, near)
+
+
+def _without_the_idle(
+    problem: ArticulatedProblem,
+    judging: ArticulatedProblem,
+    fits: Sequence[ArticulatedFit],
+    final: ArticulatedFit,
+    floor: Array,
+) -> ArticulatedFit:
+    """An explanation without effects that another one has made idle: fitted without one, the judging records are left no larger.
+
+    Only what was fitted anyway is asked, and no effect at parts of one type, which the others of its kind bear out.
+    """
+    judged = problem.settings.articulated.judgement
+    while len(final.hypothesis) > 1:
+        now = float(np.mean(predict(judging, final, floor, judged).excess))
+        rest = without_each(judging, fits, final, floor, judged)
+        spared = [
+            (float(np.mean(other.excess)), placed)
+            for placed, other in zip(final.hypothesis, rest, strict=True)
+            if other is not None and not twins(problem.nominal, placed.joint)
+        ]
+        least, idle = min(spared, key=lambda entry: entry[0], default=(np.inf, None))
+        if idle is None or least > now:
+            return final
+        keys = keys_of(final) - {idle.key}
+        final = max((f for f in fits if keys_of(f) == keys), key=lambda f: f.log_posterior)
+    return final
 
 
 def _without_a_twin(

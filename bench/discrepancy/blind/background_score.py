@@ -36,7 +36,7 @@ from bench.laws.registry import find_law
 
 CLASSES = ("main", "unstated", "background", "clean", "foreign beside")
 BY_ANOTHER_NAME = {
-    "hidden_resonator": ("base_flexibility",),
+    "hidden_resonator": ("base_flexibility", "carried_mass"),
     "hum": ("displacement_hum", "velocity_hum", "acceleration_hum", "force_hum"),
 }
 """Things of a background that are effects of the catalogue: hum in readings, and what is one by derivation, beside nominal parameters.

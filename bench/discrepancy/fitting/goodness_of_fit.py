@@ -35,8 +35,12 @@ def complexity(hypothesis: Hypothesis, *, settings: SearchSettings = DEFAULT.sea
     A parameter counts as one, which is what it gains on average where nothing is to be gained. A law of seven parameters is larger so
     than two of one each, and what holds a law at the limit of its parameters is better told by the two.
     """
-    free = sum(not p.fixed for placed in hypothesis for p in placed.effect.parameters)
-    return free - log_prior_of(hypothesis, settings=settings)
+    return free_parameters(hypothesis) - log_prior_of(hypothesis, settings=settings)
+
+
+def free_parameters(hypothesis: Hypothesis) -> int:
+    """Number of the parameters of its effects that a fit moves."""
+    return sum(not p.fixed for placed in hypothesis for p in placed.effect.parameters)
 
 
 def consistent(fitted: Fit) -> bool:

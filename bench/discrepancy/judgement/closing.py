@@ -52,20 +52,26 @@ def with_closed(
 
 
 def as_borne_out(
-    named: Sequence[NamedEffect], ranking: Sequence[Ranked]
+    named: Sequence[NamedEffect], ranking: Sequence[Ranked], *, least: float = 0.0
 ) -> tuple[tuple[NamedEffect, ...], tuple[Ranked, ...]]:
     """Named effects and a ranking, in which what closes nothing of the judging records for sure is no surer than even.
 
     Noise that explains what several effects leave says that there is something behind each of them, but not that the catalogue holds it.
-    A share whose interval reaches zero does not say so either. The effect that closes most is as sure as it was, and so is what no judged
-    coordinate shows: a sensor beside them.
+    A share whose interval reaches zero does not say so either, nor one that is smaller than what the effect that closes most would leave
+    if its law, or the gain of a sensor, were off by as little as they are known to. That effect is as sure as it was, and so is what no
+    judged coordinate shows: a sensor beside them.
 
     Args:
         named: Effects with their shares, the one that closes most first.
         ranking: Effects by decreasing probability.
+        least: How well laws and gains are known, at best, as a part of what they make.
     """
     first, *further = named
-    in_doubt = {(e.name, e.where) for e in further if e.closed != 0.0 and e.closed_ci95[0] <= 0.0}
+    in_doubt = {
+        (e.name, e.where)
+        for e in further
+        if e.closed != 0.0 and min(e.closed - least, e.closed_ci95[0]) <= 0.0
+    }
 
     def even(entry: Probable) -> Probable:
         doubted = (entry.name, entry.where) in in_doubt

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.fitting.goodness_of_fit import complexity, key_of, log_prior_of
+from bench.discrepancy.fitting.goodness_of_fit import complexity, free_parameters, key_of, log_prior_of
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
@@ -243,10 +243,11 @@ def _plainness(entry: HeldOut) -> tuple[float, float]:
 
 
 def _no_larger(explanation: Explanation, other: Explanation) -> bool:
-    few = len(explanation.hypothesis) <= len(other.hypothesis)
-    return few or complexity(explanation.hypothesis, settings=explanation.settings.search) <= complexity(
-        other.hypothesis, settings=explanation.settings.search
-    )
+    """Whether an explanation has no more effects than another one, fewer numbers to bend, or takes no more to be described."""
+    own, theirs = explanation.hypothesis, other.hypothesis
+    few = len(own) <= len(theirs) or free_parameters(own) < free_parameters(theirs)
+    settings = explanation.settings.search
+    return few or complexity(own, settings=settings) <= complexity(theirs, settings=settings)
 
 
 def _pruned(

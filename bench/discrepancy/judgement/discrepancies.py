@@ -110,13 +110,16 @@ class Discrepancies:
         return float(np.max(self._beyond(self.of(explanation, judging=True))))
 
     def prefers(self, rival: Explanation, explanation: Explanation) -> bool:
-        """Whether the judging records prefer a rival of other names: it leaves less beyond noise where an explanation leaves most."""
+        """Whether the judging records prefer a rival of other names: it leaves less beyond noise where an explanation leaves most, and
+        that is not noise alone."""
         names, others = ({(p.effect.name, p.place.name) for p in e.hypothesis} for e in (rival, explanation))
         if not names or names == others:
             return False
+        settings = rival.settings.judgement
         theirs, own = (self._beyond(x) for x in self._judged(rival, explanation))
         widest = int(np.argmax(own))
-        return bool(theirs[widest] * rival.settings.judgement.unchanged < own[widest])
+        noise = self._beyond(settings.about_noise * settings.unchanged * self._floor)
+        return bool(max(theirs[widest] * settings.unchanged, noise[widest]) < own[widest])
 
     def _judged(self, nothing: Explanation, explanation: Explanation) -> tuple[Array, Array]:
         return self.of(nothing, judging=True), self.of(explanation, judging=True)

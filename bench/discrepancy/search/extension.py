@@ -23,6 +23,7 @@ from bench.discrepancy.screening.candidates import (
     tells_motion,
 )
 from bench.discrepancy.screening.linear_amplitudes import fainter
+from bench.discrepancy.screening.projection import Ground
 from bench.discrepancy.screening.screen import Screen
 
 
@@ -75,10 +76,8 @@ def _offers(
     """Screen one more effect beside a base, of those `among` where some are given."""
     settings = search.problem.settings
     problem = search.problem
-    named = base if base.hypothesis else None
     along = tells_motion(base, problem)
-    local = about(screen, base, explained=along)
-    ground = local.ground(named, simulated=named is not None and along)
+    named, local, ground = _beside(search, screen, base)
     solved = [p for p in local.ranked(named, ground) if not among or p.placed.key in among]
     points = refined(local, ground, solved)
     if not named:
@@ -168,11 +167,31 @@ def first_fit(problem: Problem, hypothesis: Hypothesis, start: np.ndarray, *, li
 def read_off(search: Search, screen: Screen, size: int, placed: Placed, eta: Array) -> None:
     """Fit one more effect beside the best hypothesis that is one fewer, from parameters that were read off the records."""
     base = next(f for f in search.ranked(size - 1) if all(p.key != placed.key for p in f.hypothesis))
-    named, along = base if base.hypothesis else None, tells_motion(base, search.problem)
-    local = about(screen, base, explained=along)
-    ground = local.ground(named, simulated=named is not None and along)
+    named, local, ground = _beside(search, screen, base)
     point = local.refine(Point(placed, 0.0, eta), ground)
     converge(search, [((*base.hypothesis, placed), local.starts(point, ground, named))])
+
+
+def each_beside(
+    search: Search, screen: Screen, bases: Sequence[Fit], among: Collection[tuple[str, str, str]]
+) -> None:
+    """Fit every effect of `among` beside every base, whatever a screening promises of it, from where it is most."""
+    tasks: list[Task] = []
+    for base in bases:
+        named, local, ground = _beside(search, screen, base)
+        best: dict[tuple[str, str, str], Point] = {}
+        for point in local.ranked(named, ground):
+            if point.placed.key in among:
+                best.setdefault(point.placed.key, point)
+        tasks += [((*base.hypothesis, p.placed), local.starts(p, ground, named)) for p in best.values()]
+    converge(search, tasks)
+
+
+def _beside(search: Search, screen: Screen, base: Fit) -> tuple[Fit | None, Screen, Ground]:
+    """A base unless it is the nominal model alone, the screening about it, and what it leaves."""
+    named, along = base if base.hypothesis else None, tells_motion(base, search.problem)
+    local = about(screen, base, explained=along)
+    return named, local, local.ground(named, simulated=named is not None and along)
 
 
 def contacts(search: Search, candidates: Sequence[Placed]) -> None:

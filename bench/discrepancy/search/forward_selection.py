@@ -17,7 +17,14 @@ import numpy as np
 
 from bench.discrepancy.effects.read_off import HARMONIC, TIMED
 from bench.discrepancy.fitting.fits import Search, integrate_finer, multistart
-from bench.discrepancy.fitting.goodness_of_fit import complexity, consistent, leaves_much, names, near
+from bench.discrepancy.fitting.goodness_of_fit import (
+    complexity,
+    consistent,
+    free_parameters,
+    leaves_much,
+    names,
+    near,
+)
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.fitting.starts import Point
 from bench.discrepancy.likelihood.problem import Problem
@@ -238,12 +245,12 @@ def _plain_bases(search: Search, best: Fit) -> list[Fit]:
         or complexity(best.hypothesis, settings=search.problem.settings.search) <= largest
     ):
         return []
-    plain = [f for f in search.ranked(1) if _free(f) <= settings.plain.parameters and np.isfinite(f.cost)]
+    plain = [
+        f
+        for f in search.ranked(1)
+        if free_parameters(f.hypothesis) <= settings.plain.parameters and np.isfinite(f.cost)
+    ]
     return plain[: settings.plain.bases]
-
-
-def _free(fitted: Fit) -> int:
-    return sum(not p.fixed for placed in fitted.hypothesis for p in placed.effect.parameters)
 
 
 def _promising(screen: Screen, best: Fit) -> bool:

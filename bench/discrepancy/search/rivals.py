@@ -20,7 +20,7 @@ from bench.discrepancy.screening.candidates import (
     tells_motion,
 )
 from bench.discrepancy.screening.screen import Screen
-from bench.discrepancy.search.extension import extend
+from bench.discrepancy.search.extension import each_beside
 
 PLAINER = {"hysteresis": "friction", "damping": "friction"}
 """Families whose laws become those of another one at the limits of their parameters."""
@@ -148,7 +148,7 @@ def divide(search: Search, screen: Screen, candidates: Sequence[Placed]) -> None
             if key in search.fits and key not in bases:
                 bases[key] = search.fits[key]
     if bases:
-        extend(search, screen, list(bases.values()), count=len(plain), among=plain)
+        each_beside(search, screen, list(bases.values()), plain)
 
 
 def _of_one_force(effect: Effect) -> bool:
