@@ -133,7 +133,7 @@ def test_what_another_effect_has_made_idle_goes(monkeypatch, other, kept_names):
     problem = SimpleNamespace(
         nominal=(), settings=SimpleNamespace(articulated=SimpleNamespace(judgement=None))
     )
-    found = explaining._without_the_idle(problem, problem, fits, fits[0], np.zeros(1))
+    found = explaining.without_the_idle(problem, problem, fits, fits[0], np.zeros(1))
     assert {placed.key[0] for placed in found.hypothesis} == kept_names
     assert found.log_posterior == max(f.log_posterior for f in fits if f.hypothesis == found.hypothesis)
 

@@ -14,7 +14,7 @@ from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.fits import Search
 from bench.discrepancy.fitting.goodness_of_fit import complexity, leaves_much
 from bench.discrepancy.fitting.map_fit import fit
-from bench.discrepancy.judgement.coarse import Judged, _no_larger, bounded, judge, without
+from bench.discrepancy.judgement.coarse import Judged, no_larger, bounded, judge, without
 from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
@@ -358,8 +358,8 @@ def test_what_is_small_may_be_one_of_the_small_things_of_every_rig():
 def test_two_laws_of_one_number_each_are_held_against_one_of_three():
     problem = problem_of(planted_case(n=600))
     curved = explanation(problem, "stribeck_friction")
-    assert _no_larger(explanation(problem, "coulomb_friction", "quadratic_damping"), curved)
-    assert not _no_larger(explanation(problem, "coulomb_friction", "power_law_damping"), curved)
+    assert no_larger(explanation(problem, "coulomb_friction", "quadratic_damping"), curved)
+    assert not no_larger(explanation(problem, "coulomb_friction", "power_law_damping"), curved)
 
 
 def test_a_law_of_many_parameters_takes_more_to_be_described_than_two_of_one_each():

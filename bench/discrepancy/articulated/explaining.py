@@ -147,7 +147,7 @@ def _explained(
     if not left.whole:
         fits += _with_dry_friction(problem, candidates, rungs[-1])
         near = alike(judged_by, fits, rungs[-1], predictions[-1], judged)
-        plain = _without_the_idle(problem, judged_by, fits, simplest(fits, rungs[-1], near), floor)
+        plain = without_the_idle(problem, judged_by, fits, simplest(fits, rungs[-1], near), floor)
         if plain is not rungs[-1]:
             fits += predecessors(problem, plain, fits)
             rungs = ladder(problem, [plain, *fits])
@@ -163,7 +163,7 @@ def _explained(
     return Explained(problem, judging, fits, rungs[-1], predictions, verdict, near)
 
 
-def _without_the_idle(
+def without_the_idle(
     problem: ArticulatedProblem,
     judging: ArticulatedProblem,
     fits: Sequence[ArticulatedFit],

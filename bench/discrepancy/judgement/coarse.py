@@ -169,7 +169,7 @@ def _finalists(
     base = _unvaried(base, found, settings) or base
     found = [own for own in found if own is base or _unvaried(own, found, settings) is None]
     # what is larger than what is material has been weighed already
-    return [base, *(e for e in found if e is not base and _no_larger(e.explanation, base.explanation))]
+    return [base, *(e for e in found if e is not base and no_larger(e.explanation, base.explanation))]
 
 
 def _unvaried(entry: HeldOut, found: Sequence[HeldOut], settings: CoarseSettings) -> HeldOut | None:
@@ -242,7 +242,7 @@ def _plainness(entry: HeldOut) -> tuple[float, float]:
     return (complexity(entry.explanation.hypothesis, settings=entry.explanation.settings.search), entry.total)
 
 
-def _no_larger(explanation: Explanation, other: Explanation) -> bool:
+def no_larger(explanation: Explanation, other: Explanation) -> bool:
     """Whether an explanation has no more effects than another one, fewer numbers to bend, or takes no more to be described."""
     own, theirs = explanation.hypothesis, other.hypothesis
     few = len(own) <= len(theirs) or free_parameters(own) < free_parameters(theirs)
