@@ -23,6 +23,7 @@ from scipy.signal import butter, sosfilt
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
+from laboratory.machines import machines  # noqa: E402
 from laboratory.made import STEP, Made, Rate, case_of, march, multisines, noisy, unstated  # noqa: E402
 from laboratory.oscillator import Oscillator  # noqa: E402
 from laboratory.structures import structures  # noqa: E402
@@ -181,8 +182,8 @@ def second_mode(
     return Oscillator(name, right, why).recorded(rng, loads, states[:, 0], a)
 
 
-def cases(seed: int) -> list[Made]:
-    """All cases."""
+def cases(seed: int, models: Path) -> list[Made]:
+    """All cases; models of their own are written to a folder."""
     rng = np.random.default_rng(seed)
     stated = [
         *components(rng),
@@ -192,6 +193,7 @@ def cases(seed: int) -> list[Made]:
             rng, "second_mode_and_cubic", 2e6, [["cubic_stiffness", "carried_mass"]], "a cubic spring, and a second mode near 25 Hz"
         ),
         *structures(rng),
+        *machines(rng, models),
     ]  # fmt: skip
     return [made for one in stated for made in (one, unstated(one))]
 
@@ -199,7 +201,7 @@ def cases(seed: int) -> list[Made]:
 def main() -> int:
     """Write the cases, and last what is right of them."""
     args = tyro.cli(Args, description=__doc__)
-    found = cases(args.seed)
+    found = cases(args.seed, args.out / "models")
     for made in found:
         write_case(made.case, args.out / made.name)
     entries = {

@@ -14,7 +14,7 @@ from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.fits import Search
 from bench.discrepancy.fitting.goodness_of_fit import complexity, leaves_much
 from bench.discrepancy.fitting.map_fit import fit
-from bench.discrepancy.judgement.coarse import Judged, no_larger, bounded, judge, without
+from bench.discrepancy.judgement.coarse import Judged, bounded, judge, no_larger, without
 from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
 from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
