@@ -4,8 +4,9 @@
     python scripts/measured_cases.py lab_ --cases out/laboratory-like
 
 Rigs are integrated here, apart from the bench (Runge-Kutta of fourth order, ten steps a sample). What is missing is a device
-(a magnetorheological damper, a wire rope, rubber), a sensor as it was set up (AC coupled, filtered, clipped, bent), or what no
-catalogue holds (another mode, a floor that shakes). Names that end in ``_unstated`` say nothing of their noise.
+(a magnetorheological damper, a wire rope, rubber), a sensor as it was set up (AC coupled, filtered, clipped, bent), a structure or a
+machine (a crack that closes, a beam of two modes, a load behind a belt), or what no catalogue holds (a floor that shakes). Names
+that end in ``_unstated`` say nothing of their noise.
 """
 
 from __future__ import annotations
