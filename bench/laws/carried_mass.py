@@ -6,7 +6,8 @@ mass,
     f = m_c p',  p' = -omega^2 r - 2 zeta omega (p - v),  r' = p - v.
 
 ``q`` is the position in the room. Far below its frequency it is dead weight, far above it the joint does not feel its inertia; it takes
-energy from the joint's own resonance where the two are tuned to each other. A mass that stands *under* the joint is a `base_flexibility`.
+energy from the joint's own resonance where the two are tuned to each other. It starts at rest in the room. A mass that stands *under* the
+joint is a `base_flexibility`.
 
 References:
     Den Hartog 1956, Mechanical Vibrations, section 3.2 (dynamic vibration absorber); Harris & Piersol 2002, ch. 6.

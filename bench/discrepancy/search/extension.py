@@ -166,7 +166,9 @@ def first_fit(problem: Problem, hypothesis: Hypothesis, start: np.ndarray, *, li
 
 def read_off(search: Search, screen: Screen, size: int, placed: Placed, eta: Array) -> None:
     """Fit one more effect beside the best hypothesis that is one fewer, from parameters that were read off the records."""
-    base = next(f for f in search.ranked(size - 1) if all(p.key != placed.key for p in f.hypothesis))
+    bases = (f for f in search.ranked(size - 1) if all(p.key != placed.key for p in f.hypothesis))
+    if (base := next(bases, None)) is None:
+        return
     named, local, ground = _beside(search, screen, base)
     point = local.refine(Point(placed, 0.0, eta), ground)
     converge(search, [((*base.hypothesis, placed), local.starts(point, ground, named))])

@@ -161,6 +161,8 @@ class CoggingSettings:
         "Points of that spectrum between two pitches that a stroke tells apart.",
         "The lobe of a line is two wide.",
     )
+    pitches: int = setting(400, "Pitches in the stroke, at most.", "A cost cut-off.")
+    most: int = setting(20000, "Samples that the spectrum is taken of, at most.", "A cost cut-off.")
     false_alarm: float = setting(
         0.01, "Probability that noise has a line anywhere in it.", "A fit decides; it costs one."
     )

@@ -61,13 +61,15 @@ def _line_at(problem: Problem, place: Place) -> _Line | None:
     q, v, a = (np.concatenate([part @ row for part in parts]) for parts in zip(*motions, strict=True))
     force = np.concatenate([missing_force(problem, record, place) for record in problem.records])
     stroke = float(np.ptp(q))
-    fastest = settings.samples * float(np.std(v)) * max(record.step for record in problem.records)
-    if stroke <= 0.0 or fastest <= 0.0 or stroke < 2.0 * fastest:
+    every = len(q) // settings.most + 1
+    passed = settings.samples * float(np.std(v)) * every * max(record.step for record in problem.records)
+    finest = max(passed, stroke / settings.pitches)
+    if not 0.0 < 2.0 * finest < stroke:
         return None
     smooth = np.column_stack([np.ones_like(q), q, q**2, q**3, v, a, np.sign(v)])
     left = force - smooth @ np.linalg.lstsq(smooth, force, rcond=None)[0]
-    waves = np.arange(1.0, stroke / fastest, 1.0 / settings.finer) / stroke
-    power = np.array([_power(wave, q, left) for wave in waves])
+    waves = np.arange(1.0, stroke / finest, 1.0 / settings.finer) / stroke
+    power = np.array([_power(wave, q[::every], left[::every]) for wave in waves])
     middle = np.median(power)
     best = int(np.argmax(power))
     # of a spectrum that is exponentially distributed, the largest of so many
