@@ -58,8 +58,8 @@ def _base_theta(values: Values, scales: Scales) -> Values:
 
 
 def _carried_mass(values: Values, scales: Scales) -> float:
-    """The mass on the spring: its share of what the nominal model moves along the coordinate."""
-    return float(values[0] / scales.mobility)
+    """The mass on the spring: its share of what the nominal model moves along the coordinate, of one where its motion is prescribed."""
+    return float(values[0] / (scales.mobility or 1.0))
 
 
 def _carried_theta(values: Values, scales: Scales) -> Values:

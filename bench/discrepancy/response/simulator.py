@@ -74,12 +74,17 @@ class Simulator(MeasuredCase):
         return values, etas
 
     def linear(self, hypothesis: Hypothesis, etas: list[Array], values: Array) -> StructureMatrices:
-        """Matrices at nominal values (n_parameters,), less the inertia that effects of a hypothesis carry themselves."""
+        """Matrices at nominal values (n_parameters,), less the inertia that effects of a hypothesis carry themselves.
+
+        A nominal mass may be far off on the way of a fit: of what it is there, no more is taken than the largest share.
+        """
         linear = self.structure.at(values)
         for placed, eta in zip(hypothesis, etas, strict=True):
             if carried := self.carried(placed, eta):
-                row = placed.place.rows[0]
-                linear = linear._replace(mass=linear.mass - carried * np.outer(row, row))
+                row, share = placed.place.rows[0], placed.effect.parameters[0]
+                whole = 1.0 / float(row @ np.linalg.solve(linear.mass, row))
+                most = share.value(share.bounds[1], self.scales_of(placed)) * whole
+                linear = linear._replace(mass=linear.mass - min(carried, most) * np.outer(row, row))
         return linear
 
     def carried(self, placed: Placed, eta: Array) -> float:
