@@ -27,7 +27,7 @@ sys.path.insert(0, str(ROOT / "scripts"))
 from laboratory.machines import machines  # noqa: E402
 from laboratory.made import STEP, Made, Rate, case_of, march, multisines, noisy, unstated  # noqa: E402
 from laboratory.oscillator import Oscillator  # noqa: E402
-from laboratory.structures import structures  # noqa: E402
+from laboratory.structures import second_mode, structures  # noqa: E402
 
 from bench.arrays import Array  # noqa: E402
 from bench.discrepancy.blind.protocol import write_case  # noqa: E402
@@ -164,23 +164,6 @@ OSCILLATORS = (
     ),
     Oscillator("floor", [["timed_force"]], "a floor that shakes from 3 to 6 Hz: a force that no motion tells", shaking=2.5),
 )  # fmt: skip
-
-
-def second_mode(
-    rng: np.random.Generator, name: str, cubic: float, right: Sequence[Sequence[str]], why: str
-) -> Made:
-    """A quarter of the mass stands on a spring of its own; the nominal model has one mode."""
-    loads = multisines(rng, 20.0, 0.5, 40.0, (8.0, 16.0, 12.0))
-
-    def rate(s: Array, u: Array) -> Array:
-        between = 9000.0 * (s[2] - s[0]) + (s[3] - s[1])
-        force = u[0] - 1800.0 * s[0] - 2.4 * s[1] - cubic * s[0] ** 3
-        return np.array([s[1], (force + between) / 1.5, s[3], -between / 0.5])
-
-    inputs = loads[:, None, :]
-    states = march(rate, np.zeros((4, 3)), inputs)
-    a = np.array([rate(s, u)[1] for s, u in zip(states, inputs, strict=True)])
-    return Oscillator(name, right, why).recorded(rng, loads, states[:, 0], a)
 
 
 def cases(seed: int, models: Path) -> list[Made]:

@@ -12,7 +12,6 @@ from test_articulated import LIMIT, NOISE, mjcf, problem_of, write_case
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated import explaining
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
-from bench.discrepancy.articulated_judgement import judgement
 from bench.discrepancy.articulated_judgement.judgement import kept
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.misfit import Octaves, transformed
@@ -122,18 +121,11 @@ def test_what_another_effect_has_made_idle_goes(monkeypatch, other, kept_names):
     ]
     left = {frozenset("ab"): 1.0, frozenset("b"): other}
     monkeypatch.setattr(explaining, "twins", lambda nominal, joint: set())
-    monkeypatch.setattr(
-        explaining,
-        "predict",
-        lambda judging, fit, floor, settings: SimpleNamespace(
-            excess=np.array([left[frozenset(p.key[0] for p in fit.hypothesis)]])
-        ),
-    )
-    monkeypatch.setattr(judgement, "predict", explaining.predict)
-    problem = SimpleNamespace(
-        nominal=(), settings=SimpleNamespace(articulated=SimpleNamespace(judgement=None))
-    )
-    found = explaining.without_the_idle(problem, problem, fits, fits[0], np.zeros(1))
+
+    def predicted(found):
+        return SimpleNamespace(excess=np.array([left[frozenset(p.key[0] for p in found.hypothesis)]]))
+
+    found = explaining.without_the_idle(SimpleNamespace(nominal=()), fits, fits[0], predicted)
     assert {placed.key[0] for placed in found.hypothesis} == kept_names
     assert found.log_posterior == max(f.log_posterior for f in fits if f.hypothesis == found.hypothesis)
 

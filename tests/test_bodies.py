@@ -17,7 +17,7 @@ from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.replay.verification import verify
 from bench.errors import BenchError, ModelError
 from bench.native.inverse import along
-from bench.rig.bodies import BODIES, body_value, set_body
+from bench.rig.bodies import BODIES, body_value, moved_by, set_body
 
 HEAVIER, FARTHER = 1.5, 0.02
 
@@ -178,3 +178,21 @@ def test_torques_along_a_motion_are_those_of_inverse_dynamics(option, joint, bod
         whole = np.zeros((2, 2))
         mujoco.mj_fullM(model, data, whole)
         np.testing.assert_allclose(inertia[k], np.diag(whole), rtol=1e-11)
+
+
+def test_what_a_joint_moves_of_its_own_body_is_its_entry_of_the_mass_matrix():
+    """About a hinge beside the centre of mass, turned principal axes, and along a slide; without what the body carries."""
+    inertial = '<inertial pos="0.2 0.1 -0.3" quat="0.9 0.3 0.1 0.2" mass="1.7" diaginertia="0.03 0.05 0.06"/>'
+    for kind in ("hinge", "slide"):
+        alone = (
+            f'<body name="a"><joint name="j" type="{kind}" axis="1 2 2" pos="0 0.05 0"/>{inertial}{{}}</body>'
+        )
+        load = '<body pos="1 0 0"><geom size="0.1" mass="3"/></body>'
+        models = [
+            mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{alone.format(child)}</worldbody></mujoco>")
+            for child in ("", load)
+        ]
+        data, matrix = mujoco.MjData(models[0]), np.zeros((1, 1))
+        mujoco.mj_forward(models[0], data)
+        mujoco.mj_fullM(models[0], data, matrix)
+        assert [moved_by(model, "j") for model in models] == pytest.approx([matrix[0, 0]] * 2, rel=1e-12)

@@ -35,6 +35,17 @@ def rate(t, q, v, z, theta, zdot):
     zdot[1] = -omega * (omega * z[0] + 2.0 * theta[2] * (z[1] - v[0]))
 
 
+def spring_and_damper(mass: float, frequency: float, damping_ratio: float) -> tuple[float, float]:
+    """Stiffness [N/m or N m/rad] and damping under a carried mass, of its parameters.
+
+    Examples:
+        >>> spring_and_damper(0.5, 1.0 / math.pi, 0.25)
+        (2.0, 0.5)
+    """
+    omega = 2.0 * math.pi * frequency
+    return mass * omega**2, 2.0 * damping_ratio * omega * mass
+
+
 CARRIED_MASS = ForceLaw(
     name="carried_mass",
     parameters=(

@@ -19,11 +19,26 @@ def moment(model: mujoco.MjModel, i: int) -> float:
     first, count = int(model.body_jntadr[i]), int(model.body_jntnum[i])
     for k in range(first, first + count):
         if int(model.jnt_type[k]) == int(mujoco.mjtJoint.mjJNT_HINGE):
-            turned, quaternion = np.zeros(3), np.zeros(4)
-            mujoco.mju_negQuat(quaternion, model.body_iquat[i])
-            mujoco.mju_rotVecQuat(turned, np.array(model.jnt_axis[k]), quaternion)
-            return float(turned**2 @ model.body_inertia[i])
+            return _moment_about(model, i, k)
     return float(np.max(model.body_inertia[i]))
+
+
+def _moment_about(model: mujoco.MjModel, i: int, k: int) -> float:
+    """Moment of inertia [kg m^2] of body `i` about an axis through its centre of mass that is parallel to that of joint `k` of it."""
+    turned, quaternion = np.zeros(3), np.zeros(4)
+    mujoco.mju_negQuat(quaternion, model.body_iquat[i])
+    mujoco.mju_rotVecQuat(turned, np.array(model.jnt_axis[k]), quaternion)
+    return float(turned**2 @ model.body_inertia[i])
+
+
+def moved_by(model: mujoco.MjModel, joint: str) -> float:
+    """Inertia [kg or kg m^2] that a slide or a hinge moves of its own body, without those that this carries."""
+    k = model.joint(joint).id
+    i = int(model.jnt_bodyid[k])
+    if int(model.jnt_type[k]) == int(mujoco.mjtJoint.mjJNT_SLIDE):
+        return float(model.body_mass[i])
+    arm = np.cross(model.jnt_axis[k], model.body_ipos[i] - model.jnt_pos[k])
+    return _moment_about(model, i, k) + float(model.body_mass[i] * (arm @ arm))
 
 
 def scaled_inertia(model: mujoco.MjModel, i: int, value: float) -> Array:

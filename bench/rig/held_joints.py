@@ -27,7 +27,7 @@ def with_held_joints(rig: Rig, joints: object) -> Rig:
         ModelError: A joint is no hinge and no slide.
         UnknownNameError: A joint is none of the model.
     """
-    if not _held(joints):
+    if not held(joints):
         return rig
     spec = parse(rig.mjcf, rig.folder, rig.name)
     weld(spec, joints)
@@ -37,7 +37,7 @@ def with_held_joints(rig: Rig, joints: object) -> Rig:
 def weld(spec: mujoco.MjSpec, joints: object) -> None:
     """Weld joints of a model in place; arguments and errors as of `with_held_joints`."""
     known = [joint.name for joint in spec.joints]
-    for name, at in _held(joints).items():
+    for name, at in held(joints).items():
         if name not in known:
             raise UnknownNameError("joint that was held", name, known)
         joint = spec.joint(name)
@@ -56,8 +56,14 @@ def weld(spec: mujoco.MjSpec, joints: object) -> None:
         )
 
 
-def _held(joints: object) -> dict[str, Any]:
+def held(joints: object) -> dict[str, Any]:
+    """Joints of `with_held_joints` that were held, with where."""
     return {n: at for n, at in joints.items() if at != "follow"} if isinstance(joints, Mapping) else {}
+
+
+def followed(joints: object) -> set[str]:
+    """Joints of `with_held_joints` that move as measured, whatever moves them."""
+    return {n for n, how in joints.items() if how == "follow"} if isinstance(joints, Mapping) else set()
 
 
 def _turned(body: mujoco.MjsBody, joint: mujoco.MjsJoint, at: float) -> None:

@@ -13,7 +13,6 @@ from bench.discrepancy import CaseChannel
 from bench.files import write_text
 from laboratory.made import STEP, Made, Signals, case_of, march, multisines
 
-HEAD = '<mujoco><option gravity="0 0 {gravity}" timestep="0.001"/><worldbody>'
 COUNT = 2.0 * np.pi / 4096.0
 """Step of an encoder of 12 bits [rad]."""
 
@@ -47,7 +46,7 @@ def machine(
     rng: np.random.Generator,
     folder: Path,
     name: str,
-    mjcf: str,
+    model: str,
     parameters: Mapping[str, tuple[float, float, str]],
     channels: Mapping[str, Channel],
     signals: Mapping[str, Array],
@@ -56,7 +55,7 @@ def machine(
     why: str,
 ) -> Made:
     """A case of signals (n_samples, 3) in a model of its own, which is written to a folder."""
-    write_text(folder / f"{name}.xml", mjcf)
+    write_text(folder / f"{name}.xml", model)
     records: list[Signals] = [
         {key: channel.logged(rng, signals[key][:, i]) for key, channel in channels.items()} for i in range(3)
     ]
@@ -71,24 +70,33 @@ def _bound(told: CaseChannel, channel: Channel) -> CaseChannel:
     return replace(told, target=channel.target, quantity=quantity)
 
 
+def mjcf(bodies: str, actuator: str = "", gravity: float = 0.0) -> str:
+    """An MJCF of bodies and an actuator."""
+    driven = f"<actuator>{actuator}</actuator>" if actuator else ""
+    return f'<mujoco><option gravity="0 0 {gravity}" timestep="0.001"/><worldbody>{bodies}</worldbody>{driven}</mujoco>'
+
+
+def body(name: str, joint: str, inertial: str, child: str = "") -> str:
+    """A body of an MJCF, of the attributes of its joint and of what it weighs."""
+    return f'<body name="{name}"><joint {joint}/><inertial {inertial}/>{child}</body>'
+
+
 def two_storeys(rng: np.random.Generator, folder: Path) -> Made:
     """A frame of two storeys, the upper of which has a bolted joint that slips."""
     loads = multisines(rng, 20.0, 0.5, 20.0, (40.0, 80.0, 60.0))
 
     def rate(s: Array, u: Array) -> Array:
         x, v, r, w, z = s
-        upper = 2e4 * r + 12.0 * w + 8e3 * z
-        first = (u[0] - 3e4 * x - 15.0 * v + upper) / 10.0
+        pulled = 2e4 * r + 12.0 * w + 8e3 * z
+        first = (u[0] - 3e4 * x - 15.0 * v + pulled) / 10.0
         slipping = np.minimum(np.abs(z) / 1.5e-3, 1.0) ** 4
-        return np.array([v, first, w, -upper / 8.0 - first, w - np.where(w * z > 0.0, w, 0.0) * slipping])
+        return np.array([v, first, w, -pulled / 8.0 - first, w - np.where(w * z > 0.0, w, 0.0) * slipping])
 
     states = march(rate, np.zeros((5, 3)), loads[:, None, :])
-    floors = "".join(
-        f'<body name="f{i}"><joint name="s{i}" type="slide" axis="1 0 0" stiffness="{k}" damping="{c}"/>'
-        f'<inertial pos="0 0 0" mass="{m}" diaginertia="1 1 1"/>'
-        for i, k, c, m in ((1, 3e4, 15.0, 10.0), (2, 2e4, 12.0, 8.0))
-    )
-    mjcf = f'{HEAD.format(gravity=0)}{floors}</body></body></worldbody><actuator><motor name="shaker" joint="s1"/></actuator></mujoco>'
+    slide, inertial = 'type="slide" axis="1 0 0"', 'pos="0 0 0" mass="{}" diaginertia="1 1 1"'
+    upper = body("f2", f'name="s2" {slide} stiffness="20000" damping="12"', inertial.format(8))
+    lower = body("f1", f'name="s1" {slide} stiffness="30000" damping="15"', inertial.format(10), upper)
+    model = mjcf(lower, '<motor name="shaker" joint="s1"/>')
     stated = {
         "mass:f1": (10.0, 0.2, "kg"), "mass:f2": (8.0, 0.2, "kg"), "stiffness:s1": (3e4, 1e3, "N/m"),
         "stiffness:s2": (2e4, 1e3, "N/m"), "damping:s1": (15.0, 5.0, "N s/m"), "damping:s2": (12.0, 4.0, "N s/m"),
@@ -99,7 +107,7 @@ def two_storeys(rng: np.random.Generator, folder: Path) -> Made:
         "upper": Channel("m", "response", 2e-6, "joint:s2"),
     }
     return machine(
-        rng, folder, "two_storeys", mjcf, stated, channels, {"shaker": loads, "lower": states[:, 0], "upper": states[:, 2]},
+        rng, folder, "two_storeys", model, stated, channels, {"shaker": loads, "lower": states[:, 0], "upper": states[:, 2]},
         (["bouc_wen_hysteresis"], ["presliding_friction"], ["backlash_friction"]), ("stiffness_error", "damping_error"),
         "a bolted joint in the upper storey that slips",
     )  # fmt: skip
@@ -115,10 +123,13 @@ def belt(rng: np.random.Generator, folder: Path) -> Made:
         return np.array([v, (u[0] - 0.03 * v - 2.0 * q - pull) / 0.004, w, pull / 0.006])
 
     states = march(rate, np.zeros((4, 3)), loads[:, None, :])
-    mjcf = (
-        f'{HEAD.format(gravity=0)}<body name="rotor"><joint name="axle" type="hinge" axis="0 0 1" damping="0.03" stiffness="2"/>'
-        '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/></body></worldbody>'
-        '<actuator><motor name="torque" joint="axle"/></actuator></mujoco>'
+    model = mjcf(
+        body(
+            "rotor",
+            'name="axle" type="hinge" axis="0 0 1" damping="0.03" stiffness="2"',
+            'pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"',
+        ),
+        '<motor name="torque" joint="axle"/>',
     )
     stated = {
         "inertia:rotor": (0.01, 3e-4, "kg m^2"), "damping:axle": (0.03, 0.01, "N m s/rad"), "stiffness:axle": (2.0, 0.1, "N m/rad"),
@@ -128,7 +139,7 @@ def belt(rng: np.random.Generator, folder: Path) -> Made:
         "angle": Channel("rad", "response", 1e-4, "joint:axle"),
     }
     return machine(
-        rng, folder, "belt", mjcf, stated, channels, {"torque": loads, "angle": states[:, 0]}, (["carried_mass"],), (),
+        rng, folder, "belt", model, stated, channels, {"torque": loads, "angle": states[:, 0]}, (["carried_mass"],), (),
         "six tenths of the inertia are behind a belt",
     )  # fmt: skip
 
@@ -150,10 +161,13 @@ def gantry(rng: np.random.Generator, folder: Path) -> Made:
         return np.array([v, a, w, turned - 0.02 * w])
 
     states = march(rate, np.zeros((4, 3)), loads[:, None, :])
-    mjcf = (
-        f'{HEAD.format(gravity=0)}<body name="cart"><joint name="rail" type="slide" axis="1 0 0" damping="6" stiffness="60"/>'
-        '<inertial pos="0 0 0" mass="7" diaginertia="1 1 1"/></body></worldbody>'
-        '<actuator><motor name="drive" joint="rail"/></actuator></mujoco>'
+    model = mjcf(
+        body(
+            "cart",
+            'name="rail" type="slide" axis="1 0 0" damping="6" stiffness="60"',
+            'pos="0 0 0" mass="7" diaginertia="1 1 1"',
+        ),
+        '<motor name="drive" joint="rail"/>',
     )
     stated = {
         "mass:cart": (7.0, 0.1, "kg"),
@@ -165,7 +179,7 @@ def gantry(rng: np.random.Generator, folder: Path) -> Made:
         "position": Channel("m", "response", 1e-4, "joint:rail"),
     }
     return machine(
-        rng, folder, "gantry", mjcf, stated, channels, {"drive": loads, "position": states[:, 0]}, (["carried_mass"],),
+        rng, folder, "gantry", model, stated, channels, {"drive": loads, "position": states[:, 0]}, (["carried_mass"],),
         ("mass_error", "damping_error"), "a payload that swings, two sevenths of the mass",
     )  # fmt: skip
 
@@ -181,10 +195,13 @@ def servo(rng: np.random.Generator, folder: Path) -> Made:
         return np.array([v, (20.0 * (u[0] - q) - 0.8 * v - friction) / 0.02, bristles])
 
     states = march(rate, np.zeros((3, 3)), targets[:, None, :])
-    mjcf = (
-        f'{HEAD.format(gravity=0)}<body name="arm"><joint name="hinge" type="hinge" axis="0 0 1" damping="0.1"/>'
-        '<inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/></body></worldbody>'
-        '<actuator><position name="servo" joint="hinge" kp="20" kv="0.8"/></actuator></mujoco>'
+    model = mjcf(
+        body(
+            "arm",
+            'name="hinge" type="hinge" axis="0 0 1" damping="0.1"',
+            'pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"',
+        ),
+        '<position name="servo" joint="hinge" kp="20" kv="0.8"/>',
     )
     stated = {
         "inertia:arm": (0.02, 2e-3, "kg m^2"), "damping:hinge": (0.1, 0.03, "N m s/rad"), "kp:servo": (20.0, 2.0, "N m/rad"),
@@ -194,7 +211,7 @@ def servo(rng: np.random.Generator, folder: Path) -> Made:
         "angle": Channel("rad", "response", COUNT / np.sqrt(12.0), "joint:hinge", COUNT),
     }
     return machine(
-        rng, folder, "servo", mjcf, stated, channels, {"target": targets, "angle": states[:, 0]},
+        rng, folder, "servo", model, stated, channels, {"target": targets, "angle": states[:, 0]},
         (["presliding_friction"], ["stribeck_friction"], ["coulomb_friction"]), ("damping_error",), "friction of a servo's gear",
     )  # fmt: skip
 
@@ -210,13 +227,15 @@ def pendulum(rng: np.random.Generator, folder: Path) -> Made:
         return np.array([v, -9.81 / length * np.sin(q) - lost / own])
 
     states = march(rate, np.array([[0.5, 0.8, 0.65], [0.0, 0.0, 0.0]]), np.zeros((n, 1, 3)))
-    mjcf = (
-        f'{HEAD.format(gravity=-9.81)}<body name="bob"><joint name="pivot" type="hinge" axis="0 1 0" damping="0.0036"/>'
-        f'<inertial pos="0 0 {-length}" mass="{mass}" diaginertia="1e-12 1e-12 1e-12"/></body></worldbody></mujoco>'
+    bob = body(
+        "bob",
+        'name="pivot" type="hinge" axis="0 1 0" damping="0.0036"',
+        f'pos="0 0 {-length}" mass="{mass}" diaginertia="1e-12 1e-12 1e-12"',
     )
+    model = mjcf(bob, gravity=-9.81)
     channels = {"angle": Channel("rad", "response", 3e-4, "joint:pivot")}
     return machine(
-        rng, folder, "pendulum", mjcf, {"damping:pivot": (0.0036, 0.001, "N m s/rad")}, channels, {"angle": states[:, 0]},
+        rng, folder, "pendulum", model, {"damping:pivot": (0.0036, 0.001, "N m s/rad")}, channels, {"angle": states[:, 0]},
         (["quadratic_damping", "coulomb_friction"],), (), "drag of the air and dry friction in the pivot",
     )  # fmt: skip
 

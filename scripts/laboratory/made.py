@@ -58,6 +58,12 @@ def march(rate: Rate, start: Array, inputs: Array) -> Array:
     return np.array(out)
 
 
+def with_rates(rate: Rate, start: Array, inputs: Array) -> tuple[Array, Array]:
+    """States as of `march`, and their rates, shaped alike."""
+    states = march(rate, start, inputs)
+    return states, np.array([rate(s, u) for s, u in zip(states, inputs, strict=True)])
+
+
 def multisines(
     rng: np.random.Generator, seconds: float, low: float, high: float, rms: Sequence[float]
 ) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.arrays import Array
-from laboratory.made import STEP, Made, case_of, march, multisines, noisy
+from laboratory.made import STEP, Made, case_of, multisines, noisy, with_rates
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,8 @@ class Oscillator:
             force = force - u[2] * np.tanh(v / 2e-4)
             return np.array([v, force / 2.0, self.memory(v, z) if self.memory else np.zeros_like(z)])
 
-        states = march(rate, np.zeros((3, 3)), inputs)
-        acceleration = np.array([rate(s, u)[1] for s, u in zip(states, inputs, strict=True)])
-        return self.recorded(rng, loads, *self.read(states[:, 0], acceleration))
+        states, rates = with_rates(rate, np.zeros((3, 3)), inputs)
+        return self.recorded(rng, loads, *self.read(states[:, 0], rates[:, 1]))
 
     def recorded(self, rng: np.random.Generator, load: Array, x: Array, a: Array) -> Made:
         """The case of loads, displacements and accelerations (n_samples, 3)."""

@@ -1,11 +1,13 @@
-"""More carriages as a laboratory has them: structures, machines and instruments, of which half hold what no law of the bench says."""
+"""More carriages as a laboratory has them: structures and instruments, of which half hold what no law of the bench says."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from bench.arrays import Array
-from laboratory.made import STEP, Made, march, multisines
+from laboratory.made import STEP, Made, multisines, with_rates
 from laboratory.oscillator import Oscillator
 
 
@@ -21,7 +23,7 @@ def with_mains(a: Array) -> Array:
     return a + 0.6 * np.cos(2.0 * np.pi * 50.0 * time + 0.4) + 0.2 * np.cos(2.0 * np.pi * 150.0 * time)
 
 
-def fractional(v: Array, z: Array) -> Array:
+def yielding(v: Array, z: Array) -> Array:
     """Rate of a hidden state: one relaxation, whose strength falls off with its deflection."""
     return v - z / 0.06 / (1.0 + np.abs(z) / 0.004)
 
@@ -53,7 +55,7 @@ STRUCTURES = (
     ),
     Oscillator(
         "relaxing_mount", [["viscoelastic_relaxation"]], "a mount that relaxes the slower the further it is deflected: it yields",
-        extra=lambda x, v, z: 600.0 * z, memory=fractional, also=("stiffness_error", "damping_error", "coulomb_friction"),
+        extra=lambda x, v, z: 600.0 * z, memory=yielding, also=("stiffness_error", "damping_error", "coulomb_friction"),
     ),
     Oscillator(
         "loose_guide", [["record_dependent_friction"]], "a guide whose preload was changed between the records",
@@ -88,21 +90,16 @@ def tank(rng: np.random.Generator) -> Made:
         a = (u[0] - 2.4 * v - 1800.0 * x + part * pull) / (2.0 - part)
         return np.array([v, a, p, -pull - a])
 
-    inputs = loads[:, None, :]
-    states = march(rate, np.zeros((4, 3)), inputs)
-    a = np.array([rate(s, u)[1] for s, u in zip(states, inputs, strict=True)])
+    states, rates = with_rates(rate, np.zeros((4, 3)), loads[:, None, :])
     why = "a fifth of the mass is liquid that sloshes at 2.4 Hz"
-    return Oscillator("tank", [["carried_mass"]], why).recorded(rng, loads, states[:, 0], a)
+    return Oscillator("tank", [["carried_mass"]], why).recorded(rng, loads, states[:, 0], rates[:, 1])
 
 
 def beam(rng: np.random.Generator) -> Made:
     """A cantilever driven at its tip: two modes, of which the nominal model has the first, and geometric stiffening of that."""
     loads = multisines(rng, 20.0, 0.5, 60.0, (8.0, 16.0, 12.0))
-    masses, rates, ratios = (
-        np.array([2.0, 2.0]),
-        2.0 * np.pi * np.array([4.775, 29.92]),
-        np.array([0.02, 0.01]),
-    )
+    masses, ratios = np.array([2.0, 2.0]), np.array([0.02, 0.01])
+    rates = 2.0 * np.pi * np.array([4.775, 29.92])
 
     def rate(s: Array, u: Array) -> Array:
         q, v = s[:2], s[2:]
@@ -111,15 +108,26 @@ def beam(rng: np.random.Generator) -> Made:
         own = rates[:, None] ** 2 * q + 2.0 * (ratios * rates)[:, None] * v
         return np.vstack([v, force / masses[:, None] - own])
 
-    inputs = loads[:, None, :]
-    states = march(rate, np.zeros((4, 3)), inputs)
-    a = np.array([rate(s, u)[2:].sum(axis=0) for s, u in zip(states, inputs, strict=True)])
-    right, why = (
-        [["cubic_stiffness"], ["cubic_stiffness", "carried_mass"]],
-        "a cantilever of two modes that stiffens with its deflection",
-    )
+    states, moved = with_rates(rate, np.zeros((4, 3)), loads[:, None, :])
+    right = [["cubic_stiffness"], ["cubic_stiffness", "carried_mass"]]
+    why = "a cantilever of two modes that stiffens with its deflection"
     made = Oscillator("beam", right, why, also=("mass_error", "stiffness_error", "damping_error"))
-    return made.recorded(rng, loads, states[:, 0] + states[:, 1], a)
+    return made.recorded(rng, loads, states[:, :2].sum(axis=1), moved[:, 2:].sum(axis=1))
+
+
+def second_mode(
+    rng: np.random.Generator, name: str, cubic: float, right: Sequence[Sequence[str]], why: str
+) -> Made:
+    """A quarter of the mass stands on a spring of its own; the nominal model has one mode."""
+    loads = multisines(rng, 20.0, 0.5, 40.0, (8.0, 16.0, 12.0))
+
+    def rate(s: Array, u: Array) -> Array:
+        between = 9000.0 * (s[2] - s[0]) + (s[3] - s[1])
+        force = u[0] - 1800.0 * s[0] - 2.4 * s[1] - cubic * s[0] ** 3
+        return np.array([s[1], (force + between) / 1.5, s[3], -between / 0.5])
+
+    states, rates = with_rates(rate, np.zeros((4, 3)), loads[:, None, :])
+    return Oscillator(name, right, why).recorded(rng, loads, states[:, 0], rates[:, 1])
 
 
 def structures(rng: np.random.Generator) -> list[Made]:

@@ -24,7 +24,7 @@ from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import ModelError
 from bench.rig import Element, Rig
 from bench.rig.building import parse
-from bench.rig.held_joints import weld
+from bench.rig.held_joints import held, weld
 from bench.rig.mjcf_files import mjcf_text
 
 WRONG_NUMBERS = ("mass_error", "com_error", "stiffness_error", "damping_error")
@@ -72,10 +72,8 @@ class Applied:
         return tuple(line for change in self.changes for line in change.lines)
 
     def as_tested(self, case: Case) -> Applied:
-        """The model as the records of a case were taken with it: joints that it has held are welded, which the user's own are not."""
-        spec = self.spec.copy()
-        weld(spec, case.options.get("joints"))
-        return replace(self, spec=spec)
+        """It as `as_tested` by a case."""
+        return replace(self, spec=as_tested(self.spec, case))
 
     @native.quiet()
     def compiled(self) -> mujoco.MjModel:
@@ -108,11 +106,14 @@ def specification(path: str | Path) -> mujoco.MjSpec:
     return parse(mjcf_text(path), str(Path(path).parent), f"'{path}'")
 
 
-def nominal_as_tested(spec: mujoco.MjSpec, case: Case | None) -> mujoco.MjModel:
-    """A model compiled, joints that a case has held welded."""
-    own = spec.copy()
-    weld(own, case.options.get("joints") if case else None)
-    return own.compile()
+def as_tested(spec: mujoco.MjSpec, case: Case | None) -> mujoco.MjSpec:
+    """A model as the records of a case were taken with it: a copy in which joints that were held are welded; itself where none was."""
+    joints = case.options.get("joints") if case else None
+    if not held(joints):
+        return spec
+    tested = spec.copy()
+    weld(tested, joints)
+    return tested
 
 
 @native.quiet()
@@ -204,14 +205,16 @@ def apply(
         spec.option.integrator = own.integrator
     if own.hard:
         harden(spec)
+    tested = as_tested(spec, case)
     try:
         nominal = spec.compile()
+        moved = nominal if tested is spec else tested.compile()
     except ValueError as error:
         raise ModelError(f"'{path}' is no MJCF that MuJoCo compiles: {told(error)}") from None
     places = case.options.get("places", ()) if case else ()
     named = tuple(str(p) for p in places) if isinstance(places, (list, tuple)) else ()
     sampling = case.identification[0].step if case else 0.0
-    rest = rest_of(nominal_as_tested(spec, case)) if linear else {}
+    rest = rest_of(moved) if linear else {}
     target = Target(spec, nominal, rest, loads_of(case, nominal), named, sampling)
     known = {estimate.name for estimate in findings.nominal}
     changes = [nominal_parameter(target, estimate) for estimate in findings.nominal]

@@ -16,8 +16,11 @@ from bench.discrepancy.application.target import (
     Change,
     Target,
     as_mujoco,
+    with_first,
 )
 from bench.discrepancy.verdict import NamedEffect
+from bench.laws.carried_mass import spring_and_damper
+from bench.rig.bodies import moved_by
 
 
 @dataclass(frozen=True)
@@ -67,10 +70,9 @@ def damping_error(target: Target, effect: NamedEffect) -> Change:
     """Viscous damping of a joint that a drive model lacks."""
     item = target.joint_or_tendon(effect.where)
     before = float(item.damping[0])
-    coefficients = np.array(item.damping, dtype=float)
-    coefficients[0] += values_of(effect)["added"]
-    item.damping = coefficients
-    text = f"damping {before:.6g} -> {coefficients[0]:.6g}"
+    after = before + values_of(effect)["added"]
+    with_first(item, damping=after)
+    text = f"damping {before:.6g} -> {after:.6g}"
     return Change(effect.name, item.name, "native", text, (("joint", item.name),))
 
 
@@ -98,9 +100,7 @@ def force_offset(target: Target, effect: NamedEffect) -> Change:
     force = v["force"] if "force" in v else -v["offset"]
     name = target.named(effect.where)
     tendon = target.tendon_on(effect.where, effect.name)
-    stiffness = np.zeros_like(np.asarray(tendon.stiffness, dtype=float))
-    stiffness[0] = abs(force) / SETTINGS.lever
-    tendon.stiffness = stiffness
+    with_first(tendon, stiffness=abs(force) / SETTINGS.lever)
     tendon.springlength = (math.copysign(SETTINGS.lever, force),) * 2
     text = f"a constant force of {force:.6g} on '{name}', of a spring whose end is {SETTINGS.lever:.0e} away"
     return Change(effect.name, name, "native", text, (("fixed", tendon.name),))
@@ -154,14 +154,11 @@ def elastic_train(target: Target, effect: NamedEffect) -> Change:
         name=f"{PREFIX}{name}_train", type=joint.type, axis=joint.axis, pos=joint.pos
     )
     as_mujoco(train)
-    damping = np.zeros_like(np.asarray(train.damping, dtype=float))
-    stiffness = np.zeros_like(np.asarray(train.stiffness, dtype=float))
     width = v.get("half_clearance", 0.0)
     if width > 0.0:
         target.stop(train.name, (-width, width), v["stiffness"], v["damping"], own=True)
     else:
-        stiffness[0], damping[0] = v["stiffness"], v["damping"]
-    train.stiffness, train.damping = stiffness, damping
+        with_first(train, stiffness=v["stiffness"], damping=v["damping"])
     whole = float(joint.armature)
     joint.armature = v["motor_share"] * whole
     link = target.tendon_on(name, "link")
@@ -197,13 +194,12 @@ def _read_link(target: Target, joint: str, link: str) -> None:
 
 def carried_mass(target: Target, effect: NamedEffect) -> Change:
     """A part of a body on a spring of its own: a second body at the same place, which moves along the axis of the joint."""
-    carried, frequency, ratio = effect.theta
     name = target.named(effect.where)
     joint = target.spec.joint(name)
     if joint is None:
         return element(target, effect)
-    body = target.body(joint.parent.name)
-    whole = _moved_by(joint, body)
+    body, carried = target.body(joint.parent.name), effect.theta[0]
+    whole = moved_by(target.spec.compile(), name)
     part = carried / whole
     if part >= 1.0:
         text = f"it carries {carried:.6g} of the {whole:.6g} that '{body.name}' has itself: divide the bodies behind it"
@@ -215,26 +211,13 @@ def carried_mass(target: Target, effect: NamedEffect) -> Change:
     body.mass, body.inertia = (1.0 - part) * body.mass, (1.0 - part) * rest
     spring = second.add_joint(name=f"{PREFIX}{name}_spring", type=joint.type, axis=joint.axis, pos=joint.pos)
     as_mujoco(spring)
-    omega = 2.0 * math.pi * frequency
-    for attribute, value in (("stiffness", carried * omega**2), ("damping", 2.0 * ratio * omega * carried)):
-        setattr(spring, attribute, np.eye(1, np.size(getattr(spring, attribute)))[0] * value)
+    stiffness, damping = spring_and_damper(*effect.theta)
+    with_first(spring, stiffness=stiffness, damping=damping)
     text = (
         f"{100.0 * part:.3g} % of '{body.name}' is the body '{second.name}' now, on the joint '{spring.name}' of stiffness "
-        f"{carried * omega**2:.6g} and damping {2.0 * ratio * omega * carried:.6g}"
+        f"{stiffness:.6g} and damping {damping:.6g}"
     )
     return Change(effect.name, name, "native", text, (("body", second.name), ("joint", spring.name)))
-
-
-def _moved_by(joint: Any, body: Any) -> float:
-    """Inertia of a body alone along the axis of its joint [kg or kg m^2]."""
-    if joint.type == mujoco.mjtJoint.mjJNT_SLIDE:
-        return float(body.mass)
-    axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
-    back, turned = np.zeros(4), np.zeros(3)
-    mujoco.mju_negQuat(back, body.iquat)
-    mujoco.mju_rotVecQuat(turned, axis, back)
-    arm = np.cross(axis, np.array(body.ipos) - np.array(joint.pos))
-    return float(turned**2 @ np.array(body.inertia) + body.mass * (arm @ arm))
 
 
 OF_A_RECORD = {

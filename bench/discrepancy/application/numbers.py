@@ -10,7 +10,7 @@ import numpy as np
 
 from bench.discrepancy.application.drives import set_delay, set_kp
 from bench.discrepancy.application.forces import damping_error, values_of
-from bench.discrepancy.application.target import Change, Target
+from bench.discrepancy.application.target import Change, Target, with_first
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import UnknownNameError
@@ -44,9 +44,7 @@ def _set(target: Target, kind: str, name: str, value: float, label: str) -> tupl
         return "body", body.name
     if kind in ("stiffness", "damping"):
         item: Any = target.joint_or_tendon(name)
-        coefficients = np.array(getattr(item, kind), dtype=float)
-        coefficients[0] = value
-        setattr(item, kind, coefficients)
+        with_first(item, **{kind: value})
         return target.kind(name), item.name
     if kind in ("frictionloss", "armature"):
         item = target.joint_or_tendon(name)

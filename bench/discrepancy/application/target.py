@@ -257,6 +257,14 @@ def mobility(model: mujoco.MjModel, name: str) -> float:
     return float(model.tendon_invweight0[model.tendon(name).id])
 
 
+def with_first(item: Any, **values: float) -> None:
+    """Set the linear coefficient of polynomials of a joint or tendon, its stiffness or damping, by their names."""
+    for attribute, value in values.items():
+        coefficients = np.array(getattr(item, attribute), dtype=float)
+        coefficients[0] = value
+        setattr(item, attribute, coefficients)
+
+
 def as_mujoco(item: Any) -> None:
     """Give a new joint, tendon or actuator MuJoCo's own defaults: the user's default classes are meant for others."""
     if hasattr(item, "dyntype"):

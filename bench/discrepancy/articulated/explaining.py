@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench.arrays import Array
 from bench.discrepancy.articulated.naming import left_of, verdict_of
 from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_judgement.judgement import (
@@ -143,21 +142,28 @@ def _explained(
     fits, floor = [*fits, *climbed.fits], climbed.predictions[0].floor
     rungs = climbed.rungs[: climbed.last + 1]
     predictions, near = climbed.predictions[: len(rungs)], set[EffectKeys]()
+    known = dict(zip(rungs, predictions, strict=True))
+
+    def predicted(found: ArticulatedFit) -> PredictedErrors:
+        if found not in known:
+            known[found] = predict(judged_by, found, floor, judged)
+        return known[found]
+
     left = _left(problem, judged_by, rungs[-1], predictions[-1], stated=question.stated)
     if not left.whole:
         fits += _with_dry_friction(problem, candidates, rungs[-1])
         near = alike(judged_by, fits, rungs[-1], predictions[-1], judged)
-        plain = without_the_idle(problem, judged_by, fits, simplest(fits, rungs[-1], near), floor)
+        plain = without_the_idle(problem, fits, simplest(fits, rungs[-1], near), predicted)
         if plain is not rungs[-1]:
             fits += predecessors(problem, plain, fits)
             rungs = ladder(problem, [plain, *fits])
-            predictions = [predict(judged_by, rung, floor, judged) for rung in rungs]
+            predictions = [predicted(rung) for rung in rungs]
             left = _left(problem, judged_by, plain, predictions[-1], stated=question.stated)
             near = alike(judged_by, fits, plain, predictions[-1], judged)
     fits += _without_a_twin(problem, fits, rungs[-1])
     verdict = verdict_of(
         problem, fits, rungs, predict(judged_by, None, floor, judged), predictions,
-        without_each(judged_by, fits, rungs[-1], floor, judged), judged, rng,
+        [None if rest is None else predicted(rest) for rest in without_each(fits, rungs[-1])], judged, rng,
         whole=left.whole, left=left_of(problem, rungs[-1], left.coloured, left.astray), alike=near,
     )  # fmt: skip
     return Explained(problem, judging, fits, rungs[-1], predictions, verdict, near)
@@ -165,29 +171,31 @@ def _explained(
 
 def without_the_idle(
     problem: ArticulatedProblem,
-    judging: ArticulatedProblem,
     fits: Sequence[ArticulatedFit],
     final: ArticulatedFit,
-    floor: Array,
+    predicted: Callable[[ArticulatedFit], PredictedErrors],
 ) -> ArticulatedFit:
     """An explanation without effects that another one has made idle: fitted without one, the judging records are left no larger.
 
     Only what was fitted anyway is asked, and no effect at parts of one type, which the others of its kind bear out.
+
+    Args:
+        problem: Records for identification.
+        fits: All fitted hypotheses.
+        final: What would be named.
+        predicted: What a fit predicts of the judging records.
     """
-    judged = problem.settings.articulated.judgement
+
+    def left(found: ArticulatedFit) -> float:
+        return float(np.mean(predicted(found).excess))
+
     while len(final.hypothesis) > 1:
-        now = float(np.mean(predict(judging, final, floor, judged).excess))
-        rest = without_each(judging, fits, final, floor, judged)
-        spared = [
-            (float(np.mean(other.excess)), placed)
-            for placed, other in zip(final.hypothesis, rest, strict=True)
-            if other is not None and not twins(problem.nominal, placed.joint)
-        ]
-        least, idle = min(spared, key=lambda entry: entry[0], default=(np.inf, None))
-        if idle is None or least > now:
+        rests = zip(final.hypothesis, without_each(fits, final), strict=True)
+        asked = [rest for p, rest in rests if rest is not None and not twins(problem.nominal, p.joint)]
+        best = min(asked, key=left, default=None)
+        if best is None or left(best) > left(final):
             return final
-        keys = keys_of(final) - {idle.key}
-        final = max((f for f in fits if keys_of(f) == keys), key=lambda f: f.log_posterior)
+        final = best
     return final
 
 

@@ -235,20 +235,11 @@ def _sure(gains: Array, settings: JudgementSettings) -> bool:
     return float(np.mean(gains)) > settings.sure * float(np.std(gains, ddof=1)) / np.sqrt(len(gains))
 
 
-def without_each(
-    problem: ArticulatedProblem,
-    fits: Sequence[ArticulatedFit],
-    final: ArticulatedFit,
-    floor: Array,
-    settings: JudgementSettings,
-) -> list[PredictedErrors | None]:
-    """Predictions of what a fit names without one effect after the other, by the likeliest fit of the others; None where none was made."""
-    out: list[PredictedErrors | None] = []
-    for placed in final.hypothesis:
-        made = [f for f in fits if keys_of(f) == keys_of(final) - {placed.key}]
-        best = max(made, key=lambda f: f.log_posterior, default=None)
-        out.append(None if best is None else predict(problem, best, floor, settings))
-    return out
+def without_each(fits: Sequence[ArticulatedFit], final: ArticulatedFit) -> list[ArticulatedFit | None]:
+    """The likeliest fit of what another one names without one effect after the other; None where none was made."""
+    rests = [keys_of(final) - {placed.key} for placed in final.hypothesis]
+    made = [[f for f in fits if keys_of(f) == rest] for rest in rests]
+    return [max(own, key=lambda f: f.log_posterior, default=None) for own in made]
 
 
 def alike(

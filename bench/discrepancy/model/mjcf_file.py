@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from bench.discrepancy.model.mjcf_prescribed import prescribed_channels, with_pr
 from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
 from bench.rig.building import parse
-from bench.rig.held_joints import with_held_joints
+from bench.rig.held_joints import followed, with_held_joints
 
 
 @dataclass(frozen=True)
@@ -61,8 +60,7 @@ def rig_of(case: Case) -> Rig:
 
 def _followed(case: Case, rig: Rig) -> set[str]:
     """Joints that a case has follow what was measured of them."""
-    joints = case.options.get("joints")
-    wanted = {n for n, how in joints.items() if how == "follow"} if isinstance(joints, Mapping) else set()
+    wanted = followed(case.options.get("joints"))
     known = [rig.model.joint(i).name for i in range(rig.model.njnt)]
     for name in sorted(wanted.difference(known)):
         raise UnknownNameError("joint that is followed", name, known)

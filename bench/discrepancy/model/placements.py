@@ -33,7 +33,7 @@ def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) ->
             if (
                 effect.site == "joint"
                 and len(place.rows) == effect.n_coordinates
-                and _moves(structure, place, effect)
+                and _finds_its_mass(structure, place, effect)
             ):
                 out.append(Placed(effect, place))
             if len(place.rows) != 1:
@@ -44,8 +44,8 @@ def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) ->
     return out
 
 
-def _moves(structure: Structure, place: Place, effect: Effect) -> bool:
-    """Whether a place is one for a force of an effect: a part of a mass that it moves is on the coordinate in the room of that mass."""
+def _finds_its_mass(structure: Structure, place: Place, effect: Effect) -> bool:
+    """Whether a place has what an effect carries, if it carries anything: a nominal mass whose position in the room is the coordinate."""
     if effect.carried is None:
         return True
     row = place.rows[0]

@@ -30,6 +30,7 @@ from bench.discrepancy.replay.running import Reading, Stretch, Train, controls, 
 from bench.discrepancy.replay.wound_trains import Wound, wound_trains
 from bench.discrepancy.settings import DEFAULT
 from bench.discrepancy.verdict import NamedEffect
+from bench.rig.held_joints import followed as followed_joints
 
 
 @dataclass(frozen=True)
@@ -66,10 +67,8 @@ class JointReplay:
     @property
     def driven(self) -> tuple[Joint, ...]:
         """Joints but those that the case has move as measured, whatever moves them."""
-        tied = self.case.options.get("joints")
-        return tuple(
-            joint for joint in self.model.joints if not isinstance(tied, Mapping) or joint.name not in tied
-        )
+        tied = followed_joints(self.case.options.get("joints"))
+        return tuple(joint for joint in self.model.joints if joint.name not in tied)
 
     def readings(
         self,

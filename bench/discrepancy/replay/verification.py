@@ -17,7 +17,7 @@ from bench.discrepancy.application.applying import (
     Findings,
     RunOptions,
     apply,
-    nominal_as_tested,
+    as_tested,
     specification,
 )
 from bench.discrepancy.articulated.recognition import applies
@@ -338,7 +338,7 @@ def replay_of(path: str | Path, case: Case, *, articulated: bool, findings: Find
         ModelError: The case is one of a rig of the bench.
     """
     if articulated:
-        return JointReplay.of(case, nominal_as_tested(specification(path), case), findings)
+        return JointReplay.of(case, as_tested(specification(path), case).compile(), findings)
     if not case.rig.endswith(".xml"):
         raise ModelError(
             f"the case is one of the rig '{case.rig}' of the bench; its records are run with a model of your own only where that is the rig"

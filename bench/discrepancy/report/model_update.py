@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from bench.discrepancy.model.mjcf_friction import frictionloss_of
 from bench.discrepancy.verdict import NamedEffect
+from bench.laws.carried_mass import spring_and_damper
 
 if TYPE_CHECKING:
     from bench.discrepancy.diagnosis import Diagnosis
@@ -175,9 +176,7 @@ class _Own(NamedTuple):
     @property
     def spring(self) -> tuple[float, float]:
         """Stiffness and damping of the spring under a mass that the joint carries."""
-        carried, frequency, ratio = self.effect.theta
-        omega = 2.0 * math.pi * frequency
-        return carried * omega**2, 2.0 * ratio * omega * carried
+        return spring_and_damper(*self.effect.theta)
 
     @property
     def moved(self) -> str:

@@ -12,6 +12,7 @@ fitted from several starts, so that no flexible law wins because a simpler one w
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from bench.discrepancy.fitting.goodness_of_fit import (
 )
 from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.fitting.starts import Point
-from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.likelihood.problem import Array, Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.screening.candidates import (
@@ -49,6 +50,8 @@ from bench.discrepancy.unscreened.timed_force import with_timed_force
 
 Prepared = tuple[Search, Screen, list[Point]]
 """A search before its first step: the nominal model fitted, the catalogue screened, its grid points by decreasing gain."""
+Teeth = Callable[[], tuple[Placed, Array] | None]
+"""Cogging as the records show it, read off them when it is first asked for (`fine_cogging`)."""
 
 
 def attribute(
@@ -81,7 +84,8 @@ def attribute(
         points = about(screen, nothing, explained=True).ranked()
         if not points or points[0].gain < settings.noticeable:
             return search
-    _single(search, screen, candidates, progress, deadline)
+    teeth = cache(lambda: fine_cogging(problem))
+    _single(search, screen, candidates, progress, deadline, teeth)
     for size in range(1, most):
         if not consistent(search.ranked()[0]) and not deadline.allows(f"{size + 1} effects together"):
             break
@@ -96,7 +100,7 @@ def attribute(
             break
         extend(search, screen, bases, count=4 if consistent(best) else 6 - size)
         _with_variants(search, size + 1)
-        _with_fine_cogging(search, screen, candidates, size + 1)
+        _with_fine_cogging(search, screen, candidates, size + 1, teeth)
         if HARMONIC in _read_off(candidates):
             with_harmonic_force(search, size + 1)
         with_hum(search, _read_off(candidates), size + 1)
@@ -126,6 +130,7 @@ def _single(
     candidates: Sequence[Placed],
     progress: Callable[[str], None],
     deadline: Deadline,
+    teeth: Teeth,
 ) -> None:
     """Fit single effects: the common ones, then the rarer ones and those that no screening holds where these leave something."""
     nothing = search.ranked(0)[0]
@@ -138,7 +143,7 @@ def _single(
         progress("rarer effects")
         screen.add(rare)
         extend(search, screen, [nothing], count=6, among={p.key for p in rare})
-        _with_fine_cogging(search, screen, candidates, 1)
+        _with_fine_cogging(search, screen, candidates, 1, teeth)
     stand_in(search)
     lengthen(search, 1, candidates)
     if deadline.allows("forces from outside and friction that follows a channel"):
@@ -157,10 +162,12 @@ def _with_variants(search: Search, size: int) -> None:
     with_analogue_lag(search, size)
 
 
-def _with_fine_cogging(search: Search, screen: Screen, candidates: Sequence[Placed], size: int) -> None:
+def _with_fine_cogging(
+    search: Search, screen: Screen, candidates: Sequence[Placed], size: int, teeth: Teeth
+) -> None:
     """Fit cogging of a pitch that no grid holds, where it is asked for and nothing explains the records yet."""
     asked = any(p.effect.name == COGGING for p in candidates)
-    if asked and not consistent(search.ranked()[0]) and (found := fine_cogging(search.problem)) is not None:
+    if asked and not consistent(search.ranked()[0]) and (found := teeth()) is not None:
         read_off(search, screen, size, *found)
 
 
