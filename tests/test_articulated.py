@@ -35,6 +35,7 @@ from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import Encoder, weight_of_readings
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
 from bench.discrepancy.multibody.records import corrected, settled
+from bench.discrepancy.precheck.checking import check
 from bench.discrepancy.replay.verification import replay_of
 from bench.discrepancy.report.html_page import write_report
 from bench.discrepancy.report.rerun_recording import write_rerun
@@ -215,6 +216,24 @@ def test_models_that_it_cannot_take_are_refused_in_one_line(tmp_path, says):
     with pytest.raises(BenchError, match=says) as error:
         diagnose(read_case(folder))
     assert "\n" not in str(error.value)
+
+
+def test_a_delay_that_the_model_states_is_no_other_torque_and_degrees_are_no_doubt(tmp_path):
+    late = mjcf(servo=True).replace("<position ", '<position delay="0.03" nsample="80" ')
+    folder = write_case(tmp_path, late, servo=True, nominal=late, length=3.0)
+    stated = json.loads((folder / "nominal.json").read_text())
+    for channel in stated["channels"].values():
+        if channel["unit"] == "rad":
+            channel["unit"] = "deg"
+            channel["noise_std"] = float(np.degrees(channel["noise_std"]))
+    (folder / "nominal.json").write_text(json.dumps(stated))
+    for file in folder.glob("*.csv"):
+        names, table = file.read_text().splitlines()[0], np.loadtxt(file, delimiter=",", skiprows=1)
+        table[:, 1:] = np.degrees(table[:, 1:])
+        np.savetxt(file, table, delimiter=",", header=names, comments="", fmt="%.9g")
+    checked = check(read_case(folder), informed=False)
+    assert checked.word == "ready", checked.doubts
+    assert sum("converted to rad" in note for note in checked.notes) == 4
 
 
 def test_a_joint_that_was_held_is_welded_where_it_was(tmp_path):

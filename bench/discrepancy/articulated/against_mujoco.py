@@ -51,10 +51,11 @@ def left_out(
 ) -> str:
     """What MuJoCo has act on a joint along the measured motion and the joint's equation has not, in words; empty where nothing is.
 
-    Dry friction is left out of both: at rest it is whatever holds the joint.
+    Dry friction is left out of both, which is whatever holds the joint at rest, and so are delays: a balance of forces has no past.
     """
     plain = copy.copy(compiled)
     plain.dof_frictionloss[:] = 0.0
+    plain.actuator_delay[:] = 0.0
     worst: _Apart | None = None
     for r, (record, motion) in enumerate(moving):
         picked = np.unique(np.linspace(0, len(record) - 1, settings.poses).astype(int))

@@ -2,7 +2,7 @@
 
 What counts as right, by the class of a case:
 
-- none: the verdict *none* (anything else is a false alarm); foreign: the verdict *unknown*.
+- none: the verdict *none* (anything else is a false alarm); foreign: the verdict *unknown*, or what it is by derivation.
 - single, double: the verdict *effect*, with the withheld effects and no others, each at its place; one of them may be another
   member of a set that the verdict declares indistinguishable, if the set holds the truth.
 - struck (the true effect was taken out of the catalogue): *unknown*, or an effect of the truth's family.
@@ -26,6 +26,7 @@ from bench.discrepancy.blind.background_score import (
     background_class,
     background_right,
     background_summary,
+    by_another_name,
 )
 from bench.discrepancy.blind.proportions import Share, calibration_error, reliability, share_of
 from bench.discrepancy.blind.region_overlap import region_scores
@@ -96,7 +97,10 @@ def _scored(name: str, result: Mapping[str, Any], answer: Mapping[str, Any]) -> 
     said = tuple((e["name"], (e.get("where", "") or "") if placed else "") for e in result["named"])
     kind = "struck" if answer.get("struck") else background_class(answer) or str(answer["class"])
     right = (
-        background_right(answer, result) if kind in CLASSES else _right(result, set(said), set(truth), kind)
+        background_right(answer, result)
+        if kind in CLASSES
+        else _right(result, set(said), set(truth), kind)
+        or (kind == "foreign" and by_another_name(answer, [name for name, _ in said]))
     )
     families = None
     if kind in {"single", "double"}:

@@ -75,12 +75,18 @@ def hysteretic_rate(values: Values, scales: Scales) -> float:
     return n * scales.velocity * b * (1.0 + abs(ratio)) * level ** (n - 1.0)
 
 
+RESONANT_DAMPING = FreeParameter("damping_ratio", mean=math.log(0.03), std=0.8, bounds=(math.log(1e-3), 0.0))
+"""Damping ratio of a hidden resonance: that of metal structures with joints."""
+
+
 def _resonant_frequency(
-    usual: float, std: float, bounds: tuple[float, float], grid: tuple[float, ...]
+    usual: float, std: float, bounds: tuple[float, float], first: float, last: float
 ) -> FreeParameter:
-    """Frequency of a hidden resonance; all but the spread over the largest velocity by the largest displacement, of which the frequency of
-    a harmonic motion is 1 / (2 pi)."""
+    """Frequency of a hidden resonance, screened from `first` to `last` as finely as a resonance of the usual damping is wide; all but the
+    spread over the largest velocity by the largest displacement, of which the frequency of a harmonic motion is 1 / (2 pi)."""
     low, high = bounds
+    width = 2.0 * math.exp(RESONANT_DAMPING.mean)
+    grid = np.geomspace(first, last, 1 + math.ceil(math.log(last / first) / width))
     return FreeParameter(
         "frequency",
         "velocity/position",
@@ -92,8 +98,6 @@ def _resonant_frequency(
     )
 
 
-RESONANT_DAMPING = FreeParameter("damping_ratio", mean=math.log(0.03), std=0.8, bounds=(math.log(1e-3), 0.0))
-"""Damping ratio of a hidden resonance: that of metal structures with joints."""
 HYSTERESIS = (
     FreeParameter("A", "stiffness", mean=math.log(0.2), std=1.5, bounds=(-7.0, 4.0)),
     FreeParameter(
@@ -179,7 +183,7 @@ RARER: tuple[Effect, ...] = (
             FreeParameter(
                 "stiffness_loss", "stiffness", mean=math.log(0.1), std=1.2, bounds=(-8.0, math.log(0.95))
             ),
-            _resonant_frequency(0.4, 0.7, (0.03, 3.0), (0.2, 0.35, 0.6)),
+            _resonant_frequency(0.4, 0.7, (0.03, 3.0), 0.15, 1.0),
             RESONANT_DAMPING,
         ),
         BASE_FLEXIBILITY.equation,
@@ -193,9 +197,9 @@ RARER: tuple[Effect, ...] = (
         "stiffness",
         "joint",
         (
-            FreeParameter("share", mean=math.log(0.2), std=0.8, bounds=(math.log(0.005), math.log(0.9))),
+            FreeParameter("share", mean=math.log(0.2), std=1.5, bounds=(math.log(0.0005), math.log(0.9))),
             # from liquids and ropes far below the joint's own resonance to modes of parts far above it
-            _resonant_frequency(0.3, 1.2, (0.01, 10.0), (0.05, 0.09, 0.15, 0.25, 0.4, 0.65, 1.0, 1.6)),
+            _resonant_frequency(0.3, 1.2, (0.01, 10.0), 0.05, 1.6),
             RESONANT_DAMPING,
         ),
         "f = m_c (y'' - q''), y'' = omega^2 (q - y) + 2 zeta omega (v - y'), m_c = share m",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -40,6 +40,8 @@ class CheckingSettings:
 SETTINGS = CheckingSettings()
 UNUSED = "columns that nominal.json does not name are not used"
 """Beginning of a note that is no doubt."""
+DONE = ("; converted to ", "counted from")
+"""Parts of what admission says that tell of something done, of which nothing can be wrong."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,9 @@ def check(case: Case, settings: CheckSettings | None = None, *, informed: bool =
     except BenchError as error:
         return Checked("unusable", (str(error), *found), notes, seconds=time.perf_counter() - began)
     problem = Problem(told, structure_of(told), told.identification)
-    found += [*_of_admission(admission), *doubts(told, problem)]
+    wrong, done = _of_admission(admission)
+    notes = (*notes, *done)
+    found += [*wrong, *doubts(told, problem)]
     found += [*motion_doubts(problem, own), *load_doubts(problem, own)]
     parameters: list[Told] = []
     effects: list[Told] = []
@@ -136,7 +140,8 @@ def _of_joints(
 ) -> Checked:
     """The check of an articulated model."""
     own, model, said = admitted_joints(shortened(case, settings.motion_seconds))
-    found = [*found, *said]
+    wrong, done = _of_admission(said)
+    found, notes = [*found, *wrong], (*notes, *done)
     if own is None or model is None:
         return Checked("unusable", tuple(found), notes, seconds=time.perf_counter() - began)
     found += joint_doubts(own, model)
@@ -179,6 +184,7 @@ def _of_files(case: Case) -> list[str]:
     return [note if note.startswith(UNUSED) else f"{name}: {note}" for name, note in said]
 
 
-def _of_admission(notes: tuple[str, ...]) -> list[str]:
-    """What admission says that is a doubt: nothing that was only converted."""
-    return [note for note in notes if "converted" not in note and "counted from" not in note]
+def _of_admission(said: Sequence[str]) -> tuple[list[str], list[str]]:
+    """What admission says that is a doubt, and what it only did."""
+    done = [note for note in said if any(part in note for part in DONE)]
+    return [note for note in said if note not in done], done

@@ -97,11 +97,11 @@ def _of_clocks(
     channel, position = input_of(own, joint).name, encoders_of(own, joint).channels[0].name
     assert joint.drive is not None
     held = 0.5 * record.step if own.load_interpolation == "zero_order_hold" else 0.0
-    late = -found.lag - held  # the joint after the target
+    late = -found.lag - held - joint.drive.delay  # the joint after the target, beyond what the model says
     least = SETTINGS.certain * found.lag_std
     hold = joint.drive.stiffness or abs(joint.drive.gear) * joint.drive.kp
-    # a servo lags by its damping over its gain
-    overstated = joint.damping / hold
+    # a servo lags by its damping over its gain, and by the delay that its model states
+    overstated = joint.damping / hold + joint.drive.delay
     stated = [p.std for p in own.parameters if p.name in (f"damping:{joint.name}", f"kv:{joint.drive.name}")]
     unsure = SETTINGS.sigmas * float(np.hypot.reduce(stated or [0.0])) / hold
     if abs(found.drift) > max(SETTINGS.samples * record.step, SETTINGS.certain * found.drift_std):

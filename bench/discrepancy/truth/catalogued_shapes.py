@@ -55,6 +55,19 @@ def presliding(rng: np.random.Generator, r: Reach) -> Shape:
     return shape
 
 
+def carried(rng: np.random.Generator, r: Reach) -> Shape:
+    """A part of the mass on a spring, from liquids in a tank to the mode of a part well above the motion."""
+    frequency = between(rng, 0.3, 3.0) * r.omega / (2.0 * math.pi)
+    damping_ratio = between(rng, 0.005, 0.1)
+
+    def shape(a: float) -> Drawn:
+        values = {"share": a / (1.0 + a), "frequency": frequency, "damping_ratio": damping_ratio}
+        mass = values["share"] * r.inertia
+        return Drawn(values, (mass, frequency, damping_ratio), carried=mass)
+
+    return shape
+
+
 def bouc_wen(rng: np.random.Generator, r: Reach) -> Shape:
     """Bouc-Wen hysteresis."""
     yielding, skew, n = between(rng, 0.08, 0.6), rng.uniform(-0.3, 0.9), float(rng.choice([1.0, 1.5, 2.0]))

@@ -85,6 +85,8 @@ class Truth:
         for e in effects:
             if e.recipe.site == "inertia":
                 value[_mass_name(self.rig, e.where)] *= 1.0 + e.drawn.values["relative_error"]
+            if e.drawn.carried:
+                value[_mass_name(self.rig, e.where)] -= e.drawn.carried
         if self.rig != "joint":
             one = np.ones((1, 1))
             return RigMatrices(

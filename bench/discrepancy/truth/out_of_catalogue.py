@@ -1,7 +1,8 @@
 """Effects that stand in no catalogue: what the blind protocol withholds so that *unknown* can be put to the test.
 
-Each is a force that engineers meet and that no law of `bench.laws` describes. None of them may ever enter the catalogue;
-they are laws all the same, so that MuJoCo's callback integrates them like any other.
+Each is a force that engineers meet and that no law of `bench.laws` describes. None of them may ever enter the catalogue
+as it stands (a hidden resonator is two of its effects at once, and counts as right by these names, too); they are laws all the
+same, so that MuJoCo's callback integrates them like any other.
 
 - `modulated_stiffness`: a stiffness that follows the clock (a gear mesh, a breathing crack); the force depends on time.
 - `fractional_damping`: ``C d^alpha q / dt^alpha``, memory over decades of time, as rubber has; eight relaxations side by
@@ -12,7 +13,7 @@ they are laws all the same, so that MuJoCo's callback integrates them like any o
 - `friction_cone`: friction in two directions with one limit for both together; axial slip lowers the torsional friction.
 - `saturating_spring`: a stiffness about rest that fades with the displacement, as a magnet's or a slipping belt's does.
 - `hertz_contact`: a contact whose force grows with the penetration to 3/2, on one side.
-- `hidden_resonator`: a mass on a spring that nobody modelled: complex memory, where a relaxation's is real.
+- `hidden_resonator`: a mass on a spring that nobody modelled or weighed: complex memory, where a relaxation's is real.
 - `displacement_dependent_damping`: ``c q^2 v``, a product of two coordinates.
 - `stress_softening`: a spring that gives way with the largest displacement it has ever seen, and never recovers.
 - `position_dependent_friction`: friction that rises and falls along the stroke, as a lead screw's does.

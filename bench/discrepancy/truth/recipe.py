@@ -34,6 +34,7 @@ class Reach(NamedTuple):
         omega: Angular frequency of the motion, V / X [rad/s].
         duration: Length of a record [s].
         force2, position2, velocity2, stiffness2: The same for the last coordinate of the place.
+        inertia: Mass or inertia of the body that the coordinate moves; 0 where its motion is prescribed.
     """
 
     force: float
@@ -46,6 +47,7 @@ class Reach(NamedTuple):
     position2: float
     velocity2: float
     stiffness2: float
+    inertia: float = 0.0
 
 
 class Drawn(NamedTuple):
@@ -55,11 +57,13 @@ class Drawn(NamedTuple):
         values: Parameters by the name of the catalogue (or of the foreign law), the amplitude first.
         theta: Parameters of the law; empty for effects that are none.
         region: Intervals of displacement within which the force acts; empty where it acts everywhere.
+        carried: Part of the body's inertia that its law moves instead of the body.
     """
 
     values: Mapping[str, float]
     theta: tuple[float, ...] = ()
     region: tuple[tuple[float, float], ...] = ()
+    carried: float = 0.0
 
 
 Shape = Callable[[float], Drawn]

@@ -236,7 +236,7 @@ def reach_of(bench: Bench, where: str) -> Reach:
     )
     return Reach(
         force[0], float(position[0]), float(velocity[0]), stiffness[0], rate, duration,
-        force[-1], float(position[-1]), float(velocity[-1]), stiffness[-1],
+        force[-1], float(position[-1]), float(velocity[-1]), stiffness[-1], truth.values.get("mass", 0.0),
     )  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from bench.discrepancy.truth import out_of_catalogue as foreign
 from bench.discrepancy.truth.recipe import Recipe
 from bench.errors import UnknownNameError
 from bench.laws.bouc_wen import BOUC_WEN
+from bench.laws.carried_mass import CARRIED_MASS
 from bench.laws.constant_force import CONSTANT_FORCE
 from bench.laws.coulomb import COULOMB
 from bench.laws.coupling import CROSS_STIFFNESS, GAP_COUPLING
@@ -63,6 +64,7 @@ RECIPES: tuple[Recipe, ...] = (
         shapes.one("rate", lambda r: r.stiffness / r.duration, lambda r: 0.0, signed=True), law=STIFFNESS_DRIFT,
     ),
     Recipe("mass_error", "inertia", shapes.relative, rigs=FREE),
+    Recipe("carried_mass", "joint", shapes.carried, rigs=DRIVEN_BY_FORCE, law=CARRIED_MASS),
     Recipe("actuator_delay", "actuator", shapes.delay, rigs=DRIVEN_BY_FORCE),
     Recipe("actuator_lag", "actuator", shapes.one("time_constant", lambda r: 1.0 / r.omega), rigs=DRIVEN_BY_FORCE),
     Recipe("force_gain_error", "actuator", shapes.relative, rigs=DRIVEN_BY_FORCE),
