@@ -111,6 +111,26 @@ def test_what_a_channel_does_wrong_is_noted(change, words):
     assert any(words in note for note in noted(with_values(planted_case(), change)))
 
 
+@pytest.mark.parametrize(
+    "held",
+    [
+        lambda t: 6.0 * np.sign(np.sin(1.3 * t)) * (np.abs(np.sin(1.3 * t)) > 0.6),  # steps
+        lambda t: 6.0 * np.tanh(4.0 * np.sin(0.8 * t)),  # moves that come to rest
+        lambda t: 6.0 * (1.0 - np.exp(-3.0 * (t % 4.0))) * (t % 8.0 < 4.0),  # a lag behind steps
+    ],
+    ids=["steps", "moves", "lag"],
+)
+def test_a_load_that_is_held_is_not_called_saturated(held):
+    case = planted_case()
+    force = case.identification[0].values["force"]
+    noise = 0.02 * np.random.default_rng(2).standard_normal(len(force))
+    told = noted(with_values(case, lambda v: v | {"force": held(np.arange(len(force)) / 500.0) + noise}))
+    assert not any("dwells" in note for note in told)
+    ends = np.percentile(force, (8, 92))
+    told = noted(with_values(case, lambda v: v | {"force": np.clip(v["force"], *ends)}))
+    assert any("dwells" in note for note in told)
+
+
 def drifting(x: np.ndarray) -> np.ndarray:
     """Samples taken by a clock that loses ten samples along the record."""
     n = np.arange(len(x))

@@ -52,6 +52,15 @@ def test_what_belongs_to_a_record_is_left_alone(change):
     assert outliers(change(motion())) == [[], []]
 
 
+def test_the_last_sample_before_a_reversal_of_friction_was_measured():
+    rng = np.random.default_rng(4)
+    x = np.sin(3.0 * TIME)
+    force = 900.0 * x + 60.0 * np.sign(np.cos(3.0 * TIME)) + 2.0 * rng.standard_normal(N)
+    assert outliers(np.column_stack([x, force])) == [[], []]
+    force[1003] += 500.0
+    assert outliers(np.column_stack([x, force])) == [[], [OutlierRun(1003, 1003)]]
+
+
 def test_what_two_channels_show_at_once_or_one_over_and_over_belongs_to_the_record():
     blow = motion()
     blow[900] += [0.8, -700.0]

@@ -28,6 +28,7 @@ class OutlierSettings:
             comes there, and what has corners (bursts that begin, reversals of friction) does by a little.
         large: The same as a part of the channel's standard deviation; what is smaller than this does no harm.
         healed: Part of `clear` that may be left once the samples are taken out.
+        aside: Part of its departure by which a sample is off from either side's own course, too.
         block: Samples over which what is usual is taken.
         longest: Successive samples that are taken out at most where they are no hold: what lasts longer may have been.
         longest_hold: The same of a hold.
@@ -38,6 +39,7 @@ class OutlierSettings:
     clear: float = 12.0
     large: float = 0.1
     healed: float = 0.4
+    aside: float = 0.5
     block: int = 256
     longest: int = 1
     longest_hold: int = 10
@@ -72,9 +74,10 @@ def outliers(values: Array, settings: OutlierSettings = SETTINGS) -> list[list[O
     found = [_runs(column, own, settings) for column, own in zip(values.T, size, strict=True)]
     alone: list[list[OutlierRun]] = []
     for c, runs in enumerate(found):
-        others = [size[k] for k in range(count) if k != c]
-        kept = [run for run in runs if _held(values[:, c], run) or not _shared(run, others, settings)]
-        alone.append(kept if len(kept) <= max(settings.fewest, settings.most * n) else [])
+        column, others = values[:, c], [size[k] for k in range(count) if k != c]
+        kept = [run for run in runs if _held(column, run) or not _shared(run, others, settings)]
+        few = len(kept) <= max(settings.fewest, settings.most * n)
+        alone.append([run for run in kept if few and (_held(column, run) or _aside(column, run, settings))])
     return alone
 
 
@@ -140,6 +143,14 @@ def _heals(column: Array, run: OutlierRun, limit: float, settings: OutlierSettin
     part = column[low:high].copy()
     _bridge(part, OutlierRun(run.first - low, run.last - low))
     return bool(np.max(np.abs(part[2:-2] - _expected(part))) < settings.healed * limit)
+
+
+def _aside(column: Array, run: OutlierRun, settings: OutlierSettings) -> bool:
+    """Whether a run is off from the straight course of either side by a good part of what it is off from the bridge between them."""
+    bridge = bridged(column, [run])[run.first]
+    before = 2.0 * column[run.first - 1] - column[run.first - 2] - column[run.first]
+    after = 2.0 * column[run.last + 1] - column[run.last + 2] - column[run.last]
+    return bool(min(abs(before), abs(after)) > settings.aside * abs(column[run.first] - bridge))
 
 
 def _bridge(column: Array, run: OutlierRun) -> None:

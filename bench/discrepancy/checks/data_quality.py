@@ -218,9 +218,37 @@ def _levelled(samples: Array, noise: float, *, settings: DiagnosisSettings) -> b
         if (
             settings.checks.levelled < top < settings.checks.square
             and top > settings.checks.neighbours * below
+            and _cut_off(depth, width, settings.checks.approach)
         ):
             return True
     return False
+
+
+def _cut_off(depth: Array, width: float, approach: float) -> bool:
+    """Whether a signal would mostly have gone on beyond its extreme where it reaches it, rather than come to rest or jump there.
+
+    It goes on where the course of what lies within so many widths before, at least a few samples, is beyond the extreme by a width
+    before it has come as far again.
+
+    Args:
+        depth: Samples (n,) below the extreme.
+        width: Of the band that counts as the extreme.
+        approach: Widths.
+    """
+    inside = depth <= width
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
+    beyond, dwelt = 0, 0
+    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if first < 4:
+            continue
+        far = np.flatnonzero(depth[:first][::-1] > approach * width)
+        count = max(int(far[0]) if len(far) else first, 4)
+        before, after = np.arange(first - count, first), np.arange(first, min(end, first + count))
+        course = np.polynomial.Polynomial.fit(before, depth[before], 2 if count > 4 else 1)
+        dwelt += end - first
+        if float(course(after).min()) < -width:
+            beyond += end - first
+    return 2 * beyond > dwelt
 
 
 def _understated(case: Case, problem: Problem) -> Iterator[str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
 from bench.discrepancy.precheck.settings import CheckSettings
+from bench.recording.outliers import SETTINGS as OUTLIERS
 
 
 def sample_doubts(case: Case, settings: CheckSettings) -> Iterator[str]:
@@ -36,7 +37,8 @@ def _torn(record: CaseRecord, name: str, settings: CheckSettings) -> Iterator[st
     worst = np.flatnonzero(middle > max(settings.glitch * usual, 0.02 * spread))
     # a step of a square wave leaves the same, but does not come back: neighbours two samples away then differ as much
     back = [k for k in worst + 2 if abs(x[k - 2] - x[k + 2]) < 0.3 * abs(x[k] - 0.5 * (x[k - 2] + x[k + 2]))]
-    if back and len(back) < 0.01 * len(x):
+    # what happens over and over belongs to the record: impacts
+    if 0 < len(back) <= max(OUTLIERS.fewest, OUTLIERS.most * len(x)):
         when = record.start + back[0] * record.step
         yield (
             f"'{name}' in '{record.name}' jumps away and back at t = {when:.6g} s ({len(back)} such sample(s)): a torn or swapped row? "

@@ -181,6 +181,11 @@ class ChecksSettings:
     neighbours: float = setting(
         5.0, "The same as a multiple of those in the next cell.", "A pure sine has 2.4 times as many."
     )
+    approach: float = setting(
+        9.0,
+        "Widths of the band at the extremes from below which a signal's course is continued to see whether it was cut off there.",
+        "A parabola needs some; one that comes to rest has bent by then, and one that is stepped has no sample there.",
+    )
     square: float = setting(
         0.5,
         "Part of the samples at the extremes from which a signal is a square wave or a hold, not a clipped one.",
