@@ -156,6 +156,7 @@ def _explained(
         plain = without_the_idle(problem, fits, simplest(fits, rungs[-1], near), predicted)
         if plain is not rungs[-1]:
             fits += predecessors(problem, plain, fits)
+            fits += _rivals_beside(problem, fits, rungs[-1], plain)
             rungs = ladder(problem, [plain, *fits])
             predictions = [predicted(rung) for rung in rungs]
             left = _left(problem, judged_by, plain, predictions[-1], stated=question.stated)
@@ -235,6 +236,29 @@ def _with_dry_friction(
         if not problem.deadline.allows("dry friction in the place of what is named"):
             break
         out.append(exchanged(problem, final, laws, [dry[p.joint] for p in laws]))
+    return out
+
+
+def _rivals_beside(
+    problem: ArticulatedProblem,
+    fits: Sequence[ArticulatedFit],
+    before: ArticulatedFit,
+    plain: ArticulatedFit,
+) -> list[ArticulatedFit]:
+    """What could not be told from an effect beside the law that was simplified, fitted beside the simpler one, while there is time."""
+    out = list[ArticulatedFit]()
+    near, own = problem.settings.articulated.judgement.rival, keys_of(before)
+    for f in fits:
+        lost = [p for p in before.hypothesis if p.key not in keys_of(f)]
+        gained = [p for p in f.hypothesis if p.key not in own]
+        if not len(lost) == len(gained) == 1 or before.log_posterior - f.log_posterior > near:
+            continue
+        keys = keys_of(plain) - {lost[0].key} | {gained[0].key}
+        if lost[0].key not in keys_of(plain) or any(keys_of(other) == keys for other in (*fits, *out)):
+            continue
+        if not problem.deadline.allows("rivals beside the simpler law"):
+            break
+        out.append(exchanged(problem, plain, lost, gained))
     return out
 
 

@@ -193,7 +193,7 @@ def _climbed(
     asked about that joint, or it stands in for something else. What it leaves of a joint is less than the joint moves: a run that is
     further off than no motion at all has explained nothing, however much worse it was before.
     What is complete gets no more but what is certain, and nothing small is added where even then something is left: it stands in for a
-    little of the form of the law that is not right.
+    little of the form of the law that is not right. What takes away all but as small a part of what was left is no such thing.
     """
     last, waiting, doubtful = 0, list[PlacedOnJoint](), list[PlacedOnJoint]()
     # of a torque, a law that is off by a part leaves the square of it; what it makes of a free run piles up
@@ -207,7 +207,8 @@ def _climbed(
         at = problem.reached(added)
         first, before, after = (p.of(at) for p in (predictions[0], predictions[last], predictions[k]))
         gained, left = float(np.mean(before.excess - after.excess)), float(np.mean(after.excess))
-        small = 0.0 if not last or complete(problem, rungs[k], settings) else least_part
+        all_but = left < least_part * float(np.mean(before.excess))
+        small = 0.0 if not last or all_but or complete(problem, rungs[k], settings) else least_part
         least = max(left if last else 0.0, small * float(np.mean(first.excess)))
         follows = bool(np.all(after.discrepancy < 1.0))
         if follows and gained > least and better(before, after, settings):

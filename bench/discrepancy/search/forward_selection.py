@@ -214,7 +214,8 @@ def _weighed_by_itself(problem: Problem, fitted: Fit) -> bool:
 def worth_extending(search: Search, screen: Screen, size: int, most: int) -> list[Fit]:
     """Hypotheses beside which one more effect is searched: the best ones, and those that promise most together with another effect.
 
-    Alone, a flexible law is bent to what two forces do, and the one that was right about half of it lies far behind.
+    Alone, a flexible law is bent to what two forces do, and the one that was right about half of it lies far behind. Of variants of
+    one hypothesis the best will do: a further effect shows beside each of them, and the variants are fitted again with it.
 
     Args:
         search: Fits so far.
@@ -226,7 +227,10 @@ def worth_extending(search: Search, screen: Screen, size: int, most: int) -> lis
         The hypotheses by decreasing posterior.
     """
     settings = search.problem.settings.search
-    problem, ranked = search.problem, search.ranked(size)
+    problem, best = search.problem, dict[frozenset[tuple[str, str]], Fit]()
+    for fitted in search.ranked(size):
+        best.setdefault(frozenset((p.effect.name, p.place.name) for p in fitted.hypothesis), fitted)
+    ranked = list(best.values())
 
     def promised(base: Fit) -> float:
         ground = screen.ground(base)
