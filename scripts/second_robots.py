@@ -1,0 +1,81 @@
+"""Write fourteen cases of robots, simulated apart from the bench and from MuJoCo, and the answers to them.
+
+    python scripts/second_robots.py CASES ANSWERS
+    python scripts/second_robots.py CASES ANSWERS --only gan-2 ptz-1
+    python scripts/arm_cases.py CASES RESULTS
+
+CASES gets one folder a case (`nominal.json`, `model.xml`, records), ANSWERS one JSON file a case, which the diagnosis must not see. The
+robots are a pan-tilt head, a vertical arm of two links, a SCARA robot, a leg, a desktop arm and a gantry. Rigid-body dynamics, friction,
+controllers and sensors are those of the package `second_robots_cases`. MuJoCo serves only to check mass matrices and bias forces of the
+nominal models; the largest difference is printed. All cases take some minutes of one core.
+
+Verdicts are graded by README.md of that package, which tells what is right to say of each case. The answers are not in the format of
+`jointbench blind score`: they describe noise and background in another way, and one case has two effects at each of two joints.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from second_robots_cases.cases import robot_cases  # noqa: E402
+from second_robots_cases.making import MadeRobotCase, make, write  # noqa: E402
+from second_robots_cases.mjcf import against_mujoco  # noqa: E402
+
+from bench.errors import UnknownNameError  # noqa: E402
+
+
+@dataclass(frozen=True)
+class Args:
+    """Write the cases and their answers."""
+
+    cases: tyro.conf.Positional[Path]
+    """Folder for the cases."""
+    answers: tyro.conf.Positional[Path]
+    """Folder for the answers."""
+    only: tuple[str, ...] = ()
+    """Names of cases; all where none is given."""
+    seed: int = 990417
+    """Of the deviations, the motions and the noise."""
+
+
+def told(made: MadeRobotCase) -> str:
+    """Sizes of the effects by joint, a line for each record."""
+    lines = []
+    for record, size in made.sizes.items():
+        if size is not None:
+            parts = (("gap", size.gap), ("background/main", size.background), ("main/noise", size.over_noise))
+            shown = ", ".join(f"{name} {_short(row)}" for name, row in parts if row)
+            lines.append(f"    {record}: {shown}\n")
+    return "".join(lines)
+
+
+def _short(row: Iterable[float | None]) -> str:
+    return " ".join("-" if x is None else f"{x:.3g}" for x in row)
+
+
+def main() -> int:
+    """Make the cases one after another."""
+    args = tyro.cli(Args, description=__doc__)
+    known = robot_cases()
+    for name in args.only:
+        if name not in known:
+            raise UnknownNameError("case", name, known)
+    for name in args.only or known:
+        made = make(known[name], args.seed)
+        write(made, args.cases, args.answers)
+        difference = against_mujoco(made.case.robot)
+        print(f"{name}: {made.case.kind}; mass matrix and bias differ from MuJoCo's by {difference:.1e}")
+        print(told(made), end="", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
