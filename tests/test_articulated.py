@@ -167,6 +167,19 @@ def test_what_was_left_out_is_named_at_its_place(tmp_path, name):
 
 
 @pytest.mark.slow
+def test_torques_that_were_held_are_read_so_where_nobody_says_and_no_delay_is_named(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=False, payload=PAYLOAD), servo=False)
+    stated = json.loads((folder / "nominal.json").read_text())
+    del stated["load_interpolation"]
+    (folder / "nominal.json").write_text(json.dumps(stated))
+    found = diagnose(read_case(folder))
+    assert isinstance(found, ArticulatedDiagnosis)
+    assert [e.name for e in found.verdict.named] == ["mass_error"]
+    assert any("read as held" in warning for warning in found.verdict.warnings)
+    assert found.case.load_interpolation == "zero_order_hold"
+
+
+@pytest.mark.slow
 def test_a_servo_arm_without_fault_is_clean_and_everything_is_written(tmp_path):
     case = read_case(write_case(tmp_path, mjcf(servo=True), servo=True))
     assert applies(case)

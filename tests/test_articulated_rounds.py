@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from test_articulated import LIMIT, NOISE, mjcf, problem_of, write_case
 
 from bench.discrepancy import diagnose, read_case
-from bench.discrepancy.articulated import explaining
+from bench.discrepancy.articulated import further_fits
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
 from bench.discrepancy.articulated_judgement.judgement import kept
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
@@ -120,12 +120,12 @@ def test_what_another_effect_has_made_idle_goes(monkeypatch, other, kept_names):
         for hypothesis, value in (((a, b), 5.0), ((b,), 3.0), ((b,), 2.0))
     ]
     left = {frozenset("ab"): 1.0, frozenset("b"): other}
-    monkeypatch.setattr(explaining, "twins", lambda nominal, joint: set())
+    monkeypatch.setattr(further_fits, "twins", lambda nominal, joint: set())
 
     def predicted(found):
         return SimpleNamespace(excess=np.array([left[frozenset(p.key[0] for p in found.hypothesis)]]))
 
-    found = explaining.without_the_idle(SimpleNamespace(nominal=()), fits, fits[0], predicted)
+    found = further_fits.without_the_idle(SimpleNamespace(nominal=()), fits, fits[0], predicted)
     assert {placed.key[0] for placed in found.hypothesis} == kept_names
     assert found.log_posterior == max(f.log_posterior for f in fits if f.hypothesis == found.hypothesis)
 

@@ -80,7 +80,7 @@ def test_cases_are_complete():
 
 
 def test_a_case_is_read_as_meant(tmp_path):
-    case = next(case for case in CASES if case.name == "door_closer_two_valves")
+    case = next(case for case in CASES if case.name == "second_door_closer_two_valves")
     rng = np.random.default_rng([1, case.number])
     one = made(case, rng)
     write_case(one, tmp_path, rng)

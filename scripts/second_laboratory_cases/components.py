@@ -21,7 +21,7 @@ def transducers(displacement: float, force: float = 0.006) -> dict[str, Channel]
 COMPONENTS = (
     Case(
         number=4,
-        name="mr_damper_machine",
+        name="second_mr_damper_machine",
         rig="damper",
         setup=TestingMachine(),
         rate=1000,
@@ -49,7 +49,7 @@ COMPONENTS = (
     ),
     Case(
         number=5,
-        name="hydraulic_orifice_machine",
+        name="second_hydraulic_orifice_machine",
         rig="damper",
         setup=TestingMachine(),
         rate=500,
@@ -73,7 +73,7 @@ COMPONENTS = (
     ),
     Case(
         number=11,
-        name="wedge_snubber_machine",
+        name="second_wedge_snubber_machine",
         rig="damper",
         setup=TestingMachine(),
         rate=256,
@@ -99,7 +99,7 @@ COMPONENTS = (
     ),
     Case(
         number=19,
-        name="bushing_machine_quiet",
+        name="second_bushing_machine_quiet",
         rig="damper",
         setup=TestingMachine(),
         rate=500,
@@ -125,7 +125,7 @@ COMPONENTS = (
     ),
     Case(
         number=22,
-        name="seat_damper_metering_pin",
+        name="second_seat_damper_metering_pin",
         rig="damper",
         setup=TestingMachine(),
         rate=500,

@@ -14,7 +14,7 @@ HELD = {"load_interpolation": "zero_order_hold"}
 
 SERVO_AXIS = Case(
     number=0,
-    name="axis_ballscrew_friction",
+    name="second_axis_ballscrew_friction",
     rig="axis.xml",
     setup=CascadeController(velocity_gain=2600.0, position_gain=22.0),
     rate=500,
@@ -60,7 +60,7 @@ OWN_DAMPING = 0.3
 
 LEG = Case(
     number=14,
-    name="hexapod_leg_servo",
+    name="second_hexapod_leg_servo",
     rig="leg.xml",
     setup=PositionServo(gain=GAIN),
     rate=200,

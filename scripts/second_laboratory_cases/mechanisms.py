@@ -23,7 +23,7 @@ MOTOR = load_on("drive")
 MECHANISMS = (
     Case(
         number=6,
-        name="rotor_stand_unbalance",
+        name="second_rotor_stand_unbalance",
         rig="rotor.xml",
         setup=LoadCell(),
         rate=500,
@@ -53,7 +53,7 @@ MECHANISMS = (
     ),
     Case(
         number=7,
-        name="pneumatic_seals",
+        name="second_pneumatic_seals",
         rig="piston.xml",
         setup=LoadCell(),
         rate=200,
@@ -83,7 +83,7 @@ MECHANISMS = (
     ),
     Case(
         number=9,
-        name="door_closer_two_valves",
+        name="second_door_closer_two_valves",
         rig="door.xml",
         setup=LoadCell(),
         rate=100,
@@ -117,7 +117,7 @@ MECHANISMS = (
     ),
     Case(
         number=12,
-        name="linear_motor_cogging",
+        name="second_linear_motor_cogging",
         rig="forcer.xml",
         setup=LoadCell(),
         rate=500,
@@ -145,7 +145,7 @@ MECHANISMS = (
     ),
     Case(
         number=15,
-        name="gearbox_backlash_rotary",
+        name="second_gearbox_backlash_rotary",
         rig="gear.xml",
         setup=LoadCell(),
         rate=500,

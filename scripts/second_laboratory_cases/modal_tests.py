@@ -41,7 +41,7 @@ def resonator(mass: float, hertz: float, ratio: float) -> dict[str, float]:
 MODAL_TESTS = (
     Case(
         number=1,
-        name="modal_mass_buffers",
+        name="second_modal_mass_buffers",
         rig="sdof",
         setup=LoadCell(),
         rate=400,
@@ -63,7 +63,7 @@ MODAL_TESTS = (
     ),
     Case(
         number=3,
-        name="beam_touching_support",
+        name="second_beam_touching_support",
         rig="sdof",
         setup=LoadCell(response="acceleration"),
         rate=1000,
@@ -85,7 +85,7 @@ MODAL_TESTS = (
     ),
     Case(
         number=8,
-        name="guide_cable_chain",
+        name="second_guide_cable_chain",
         rig="sdof",
         setup=LoadCell(),
         rate=250,
@@ -107,7 +107,7 @@ MODAL_TESTS = (
     ),
     Case(
         number=13,
-        name="hoist_trolley_payload",
+        name="second_hoist_trolley_payload",
         rig="sdof",
         setup=LoadCell(),
         rate=250,
@@ -132,7 +132,7 @@ MODAL_TESTS = (
     ),
     Case(
         number=16,
-        name="rubber_mount_hard_creep",
+        name="second_rubber_mount_hard_creep",
         rig="sdof",
         setup=LoadCell(),
         rate=400,
@@ -156,7 +156,7 @@ MODAL_TESTS = (
     ),
     Case(
         number=17,
-        name="flexure_in_oil_gauge",
+        name="second_flexure_in_oil_gauge",
         rig="sdof",
         setup=LoadCell(),
         rate=400,
@@ -179,7 +179,7 @@ MODAL_TESTS = (
     ),
     Case(
         number=18,
-        name="modal_mass_quiet",
+        name="second_modal_mass_quiet",
         rig="sdof",
         setup=LoadCell(),
         rate=500,
@@ -204,7 +204,7 @@ MODAL_TESTS = (
     ),
     Case(
         number=21,
-        name="shaft_unequal_stiffness",
+        name="second_shaft_unequal_stiffness",
         rig="sdof",
         setup=LoadCell(),
         rate=400,
@@ -226,7 +226,7 @@ MODAL_TESTS = (
     ),
     Case(
         number=23,
-        name="particle_impact_damper",
+        name="second_particle_impact_damper",
         rig="sdof",
         setup=LoadCell(),
         rate=500,

@@ -28,7 +28,7 @@ def weighed(body: str, joint: str, mass: float, stiffness: float, damping: float
 SHAKEN = (
     Case(
         number=2,
-        name="shaker_isolator_hardening",
+        name="second_shaker_isolator_hardening",
         rig="stage.xml",
         setup=ShakenBase(),
         rate=512,
@@ -55,7 +55,7 @@ SHAKEN = (
     ),
     Case(
         number=10,
-        name="quarter_car_degressive",
+        name="second_quarter_car_degressive",
         rig="car.xml",
         setup=ShakenBase(),
         rate=200,
@@ -85,7 +85,7 @@ SHAKEN = (
     ),
     Case(
         number=20,
-        name="shaker_stage_quiet",
+        name="second_shaker_stage_quiet",
         rig="stage.xml",
         setup=ShakenBase(),
         rate=400,

@@ -9,20 +9,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from bench.discrepancy.articulated.further_fits import (
+    rivals_beside,
+    with_dry_friction,
+    without_some,
+    without_the_idle,
+)
 from bench.discrepancy.articulated.naming import left_of, verdict_of
 from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_judgement.judgement import (
     EffectKeys,
+    Kept,
     PredictedErrors,
     alike,
     better,
     kept,
-    keys_of,
     ladder,
     noise_floor,
     predict,
@@ -35,13 +40,9 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.search import (
     complete,
-    exchanged,
     predecessors,
     search,
-    shortened,
-    steps,
 )
-from bench.discrepancy.multibody.nominal_parameters import twins
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 from bench.discrepancy.verdict import Verdict
 
@@ -139,127 +140,88 @@ def _explained(
         other = kept(problem, judged_by, [earlier, *fits], judged)
         if better(climbed.predictions[climbed.last], other.predictions[other.last], judged):
             climbed = other
-    fits, floor = [*fits, *climbed.fits], climbed.predictions[0].floor
-    rungs = climbed.rungs[: climbed.last + 1]
-    predictions, near = climbed.predictions[: len(rungs)], set[EffectKeys]()
-    known = dict(zip(rungs, predictions, strict=True))
-
-    def predicted(found: ArticulatedFit) -> PredictedErrors:
-        if found not in known:
-            known[found] = predict(judged_by, found, floor, judged)
-        return known[found]
-
-    left = _left(problem, judged_by, rungs[-1], predictions[-1], stated=question.stated)
-    if not left.whole:
-        fits += _with_dry_friction(problem, candidates, rungs[-1])
-        near = alike(judged_by, fits, rungs[-1], predictions[-1], judged)
-        plain = without_the_idle(problem, fits, simplest(fits, rungs[-1], near), predicted)
-        if plain is not rungs[-1]:
-            fits += predecessors(problem, plain, fits)
-            fits += _rivals_beside(problem, fits, rungs[-1], plain)
-            rungs = ladder(problem, [plain, *fits])
-            predictions = [predicted(rung) for rung in rungs]
-            left = _left(problem, judged_by, plain, predictions[-1], stated=question.stated)
-            near = alike(judged_by, fits, plain, predictions[-1], judged)
-    fits += _without_a_twin(problem, fits, rungs[-1])
+    standing = _Standing(problem, judged_by, [*fits, *climbed.fits], climbed, stated=question.stated)
+    standing.settle(candidates)
+    left, predicted = standing.left, standing.predicted
     verdict = verdict_of(
-        problem, fits, rungs, predict(judged_by, None, floor, judged), predictions,
-        [None if rest is None else predicted(rest) for rest in without_each(fits, rungs[-1])], judged, rng,
-        whole=left.whole, left=left_of(problem, rungs[-1], left.coloured, left.astray), alike=near,
+        problem, standing.fits, standing.rungs, predict(judged_by, None, standing.floor, judged), standing.predictions,
+        [None if rest is None else predicted(rest) for rest in without_each(standing.fits, standing.final)], judged, rng,
+        whole=left.whole, left=left_of(problem, standing.final, left.coloured, left.astray), alike=standing.near,
     )  # fmt: skip
-    return Explained(problem, judging, fits, rungs[-1], predictions, verdict, near)
+    return Explained(
+        problem, judging, standing.fits, standing.final, standing.predictions, verdict, standing.near
+    )
 
 
-def without_the_idle(
-    problem: ArticulatedProblem,
-    fits: Sequence[ArticulatedFit],
-    final: ArticulatedFit,
-    predicted: Callable[[ArticulatedFit], PredictedErrors],
-) -> ArticulatedFit:
-    """An explanation without effects that another one has made idle: fitted without one, the judging records are left no larger.
-
-    Only what was fitted anyway is asked, and no effect at parts of one type, which the others of its kind bear out.
+class _Standing:
+    """The explanation that stands while what is named is settled: the last rung of a ladder, with what it predicts and what it leaves.
 
     Args:
         problem: Records for identification.
-        fits: All fitted hypotheses.
-        final: What would be named.
-        predicted: What a fit predicts of the judging records.
+        judged_by: Records for judging.
+        fits: All fitted hypotheses, the likeliest first.
+        climbed: What the judging records bear out.
+        stated: Whether all noise is stated.
     """
 
-    def left(found: ArticulatedFit) -> float:
-        return float(np.mean(predicted(found).excess))
+    def __init__(
+        self,
+        problem: ArticulatedProblem,
+        judged_by: ArticulatedProblem,
+        fits: list[ArticulatedFit],
+        climbed: Kept,
+        *,
+        stated: bool,
+    ) -> None:
+        self.problem, self.judged_by, self.fits, self.stated = problem, judged_by, fits, stated
+        self.floor = climbed.predictions[0].floor
+        self.rungs = climbed.rungs[: climbed.last + 1]
+        self.predictions = climbed.predictions[: len(self.rungs)]
+        self.near = set[EffectKeys]()
+        self._known = dict(zip(self.rungs, self.predictions, strict=True))
+        self.left = self._left()
 
-    while len(final.hypothesis) > 1:
-        rests = zip(final.hypothesis, without_each(fits, final), strict=True)
-        asked = [rest for p, rest in rests if rest is not None and not twins(problem.nominal, p.joint)]
-        best = min(asked, key=left, default=None)
-        if best is None or left(best) > left(final):
-            return final
-        final = best
-    return final
+    @property
+    def final(self) -> ArticulatedFit:
+        """The explanation."""
+        return self.rungs[-1]
 
+    def predicted(self, found: ArticulatedFit) -> PredictedErrors:
+        """What a fit predicts of the judging records."""
+        if found not in self._known:
+            judged = self.problem.settings.articulated.judgement
+            self._known[found] = predict(self.judged_by, found, self.floor, judged)
+        return self._known[found]
 
-def _without_a_twin(
-    problem: ArticulatedProblem, fits: Sequence[ArticulatedFit], final: ArticulatedFit
-) -> list[ArticulatedFit]:
-    """An explanation without each effect at a part of a type, where none was made, while there is time.
+    def settle(self, candidates: Sequence[PlacedOnJoint]) -> None:
+        """Go over to the plainest of what predicts as well where something is left, and drop what closes nothing beside the others."""
+        problem = self.problem
+        if not self.left.whole:
+            self.fits += with_dry_friction(problem, candidates, self.final)
+            plain = simplest(self.fits, self.final, self._alike())
+            plain = without_the_idle(problem, self.fits, plain, self.predicted)
+            if plain is not self.final:
+                self.fits += rivals_beside(problem, self.fits, self.final, plain)
+            self._go_over_to(plain)
+        self.fits += without_some(problem, self.fits, self.rungs, self.predictions)
+        if not self.left.whole:
+            self._go_over_to(without_the_idle(problem, self.fits, self.final, self.predicted))
+            self.near = self._alike()
 
-    The first effect at such a part sets right the numbers that all parts have in common, and its step takes off what others miss besides:
-    what each of them closes is told by what comes back without it alone.
-    """
-    out = []
-    for placed in final.hypothesis if len(final.hypothesis) > 1 else ():
-        rest = keys_of(final) - {placed.key}
-        if not twins(problem.nominal, placed.joint) or any(keys_of(f) == rest for f in fits):
-            continue
-        if not problem.deadline.allows("what comes back without each effect"):
-            break
-        out.append(shortened(problem, final, (placed,)))
-    return out
+    def _go_over_to(self, final: ArticulatedFit) -> None:
+        if final is self.final:
+            return
+        self.fits += predecessors(self.problem, final, self.fits)
+        self.rungs = ladder(self.problem, [final, *self.fits])
+        self.predictions = [self.predicted(rung) for rung in self.rungs]
+        self.left = self._left()
 
+    def _alike(self) -> set[EffectKeys]:
+        judged = self.problem.settings.articulated.judgement
+        return alike(self.judged_by, self.fits, self.final, self.predictions[-1], judged)
 
-def _with_dry_friction(
-    problem: ArticulatedProblem, candidates: Sequence[PlacedOnJoint], final: ArticulatedFit
-) -> list[ArticulatedFit]:
-    """An explanation with dry friction in the place of each law of several parameters at a joint that has none, while there is time.
-
-    It is what joints have most, and what a law with more to fit imitates first; the search may never have held the two side by side.
-    """
-    dry = {p.joint: p for p in candidates if p.effect.name == "coulomb_friction"}
-    taken = {placed.joint for placed in final.hypothesis if placed.effect.name == "coulomb_friction"}
-    out, ends = [], [0, *steps(problem, final.hypothesis)]
-    for start, end in pairwise(ends):
-        laws = [p for p in final.hypothesis[start:end] if p.effect.site == "joint" and p.effect.free > 1]
-        if not laws or not {p.joint for p in laws} <= dry.keys() - taken:
-            continue
-        if not problem.deadline.allows("dry friction in the place of what is named"):
-            break
-        out.append(exchanged(problem, final, laws, [dry[p.joint] for p in laws]))
-    return out
-
-
-def _rivals_beside(
-    problem: ArticulatedProblem,
-    fits: Sequence[ArticulatedFit],
-    before: ArticulatedFit,
-    plain: ArticulatedFit,
-) -> list[ArticulatedFit]:
-    """What could not be told from an effect beside the law that was simplified, fitted beside the simpler one, while there is time."""
-    out = list[ArticulatedFit]()
-    near, own = problem.settings.articulated.judgement.rival, keys_of(before)
-    for f in fits:
-        lost = [p for p in before.hypothesis if p.key not in keys_of(f)]
-        gained = [p for p in f.hypothesis if p.key not in own]
-        if not len(lost) == len(gained) == 1 or before.log_posterior - f.log_posterior > near:
-            continue
-        keys = keys_of(plain) - {lost[0].key} | {gained[0].key}
-        if lost[0].key not in keys_of(plain) or any(keys_of(other) == keys for other in (*fits, *out)):
-            continue
-        if not problem.deadline.allows("rivals beside the simpler law"):
-            break
-        out.append(exchanged(problem, plain, lost, gained))
-    return out
+    def _left(self) -> _Left:
+        return _left(self.problem, self.judged_by, self.final, self.predictions[-1], stated=self.stated)
 
 
 class _Left(NamedTuple):
