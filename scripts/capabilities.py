@@ -215,6 +215,22 @@ CAPABILITIES: Sequence[Capability] = (
         before=(words("python scripts/laboratory_like.py out/laboratory-like"),),
     ),
     Capability(
+        "second_laboratory",
+        "Cases of a second author, who knew nothing of the diagnosis: structures, mechanisms and components",
+        words("python scripts/measured_cases.py second_ --cases out/second-laboratory --json"),
+        graded,
+        before=(words("python scripts/second_laboratory.py out/second-laboratory"),),
+    ),
+    Capability(
+        "second_robots",
+        "Cases of a second author, who knew nothing of the diagnosis: robots",
+        words(
+            "python scripts/measured_cases.py ptz vee scar hop dsk gan --cases out/second-robots/cases --json"
+        ),
+        graded,
+        before=(words("python scripts/second_robots.py out/second-robots/cases out/second-robots/answers"),),
+    ),
+    Capability(
         "check",
         "Faults planted into records of a slide, and what `jointbench check` says",
         words("python scripts/planted_faults.py --faults 200 --sound 100"),

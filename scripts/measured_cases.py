@@ -168,7 +168,10 @@ def _row(name: str, found: Mapping[str, Any], acceptance: Acceptance | None) -> 
         name,
         "" if acceptance is None else acceptance.grade(found),
         found["verdict"],
-        {e["name"]: e["probability"] for e in found["named"]},
+        {
+            f"{e['name']} ({e['where']})" if e.get("where") else e["name"]: e["probability"]
+            for e in found["named"]
+        },
         [list(entry) for entry in found["indistinguishable"]],
         found["gap"]["before"],
         found["gap"]["after"],

@@ -2,15 +2,16 @@
 
     python scripts/second_robots.py CASES ANSWERS
     python scripts/second_robots.py CASES ANSWERS --only gan-2 ptz-1
-    python scripts/arm_cases.py CASES RESULTS
+    python scripts/measured_cases.py ptz vee scar hop dsk gan --cases CASES
 
 CASES gets one folder a case (`nominal.json`, `model.xml`, records), ANSWERS one JSON file a case, which the diagnosis must not see. The
 robots are a pan-tilt head, a vertical arm of two links, a SCARA robot, a leg, a desktop arm and a gantry. Rigid-body dynamics, friction,
 controllers and sensors are those of the package `second_robots_cases`. MuJoCo serves only to check mass matrices and bias forces of the
 nominal models; the largest difference is printed. All cases take some minutes of one core.
 
-Verdicts are graded by README.md of that package, which tells what is right to say of each case. The answers are not in the format of
-`jointbench blind score`: they describe noise and background in another way, and one case has two effects at each of two joints.
+Verdicts are graded by acceptance.json, the table in README.md of that package in the form that `measured_cases.py` reads. The answers are
+not in the format of `jointbench blind score`: they describe noise and background in another way, and one case has two effects at each of
+two joints.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from second_robots_cases.making import MadeRobotCase, make, write  # noqa: E402
 from second_robots_cases.mjcf import against_mujoco  # noqa: E402
 
 from bench.errors import UnknownNameError  # noqa: E402
+from bench.files import write_text  # noqa: E402
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,8 @@ def main() -> int:
     for name in args.only:
         if name not in known:
             raise UnknownNameError("case", name, known)
+    right = Path(__file__).parent / "second_robots_cases" / "acceptance.json"
+    write_text(args.cases / "acceptance.json", right.read_text(encoding="utf-8"))
     for name in args.only or known:
         made = make(known[name], args.seed)
         write(made, args.cases, args.answers)

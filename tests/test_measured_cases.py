@@ -17,6 +17,14 @@ PLAY = Acceptance((frozenset({"backlash_friction"}),), frozenset({"force_offset"
 CLEAN = Acceptance((frozenset(),))
 
 
+PLACED = Acceptance((frozenset({"backlash@knee"}),), frozenset({"coulomb_friction@hip"}))
+
+
+def placed(*named: tuple[str, str], sets=()):
+    entries = [{"name": name, "where": where, "probability": 0.95} for name, where in named]
+    return {"verdict": "effect", "named": entries, "indistinguishable": sets, "gap": {"after": 0.1}}
+
+
 def verdict(kind: str, named: dict[str, float], sets=(), after: float | None = 0.1):
     return {
         "verdict": kind, "named": [{"name": n, "probability": p} for n, p in named.items()],
@@ -44,6 +52,19 @@ def verdict(kind: str, named: dict[str, float], sets=(), after: float | None = 0
         (PLAY, verdict("none", {}), "wrong"),
         (CLEAN, verdict("none", {}), "right"),
         (CLEAN, verdict("effect", {"gap": 0.97}), "wrong"),
+        (PLACED, placed(("backlash", "knee")), "right"),
+        (PLACED, placed(("backlash", "knee"), ("coulomb_friction", "hip")), "right"),
+        (PLACED, placed(("backlash", "hip")), "wrong"),
+        (PLACED, placed(("backlash", "knee"), ("coulomb_friction", "ankle")), "wrong"),
+        (
+            PLACED,
+            placed(
+                ("backlash", "knee"),
+                ("stribeck_friction", "hip"),
+                sets=[["coulomb_friction", "stribeck_friction"]],
+            ),
+            "honest",
+        ),
     ],
 )
 def test_a_verdict_is_graded_by_what_was_written_down(wanted, said, grade):

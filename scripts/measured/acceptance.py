@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 Grade = Literal["right", "honest", "wrong"]
 CERTAIN = 0.9
 """Probability from which a name is certain."""
+
+
+class _Named(NamedTuple):
+    """An effect that a verdict names."""
+
+    name: str
+    at: str
+    """``name@place``."""
 
 
 @dataclass(frozen=True)
@@ -18,8 +26,8 @@ class Acceptance:
     """What is right of a case.
 
     Attributes:
-        right: Names of effects, any one of these groups; an empty group where nothing is missing.
-        also: Names that may stand beside them.
+        right: Names of effects, any one of these groups; an empty group where nothing is missing. ``name@place`` asks for the place, too.
+        also: Names that may stand beside them, likewise.
         nrmse: Largest discrepancy that may be left on the judging records; none where None.
         why: What is known of the case, and from whom.
     """
@@ -33,9 +41,12 @@ class Acceptance:
         """Grade a verdict.
 
         Right: a group is named, beside nothing but what may stand there, and what is left is small enough. Honest: *unknown*, a declared
-        set that holds a right name, or no name that is certain and false. Wrong: a certain false name, or *none* over an effect.
+        set that holds a right name, or no name that is certain and false. Wrong: a certain false name that no declared set holds together
+        with one that may stand there, or *none* over an effect.
         """
-        named = {e["name"]: e["probability"] for e in verdict["named"]}
+        named = {
+            _Named(e["name"], f"{e['name']}@{e.get('where', '')}"): e["probability"] for e in verdict["named"]
+        }
         kind, sets = verdict["verdict"], verdict.get("indistinguishable") or ()
         if kind == "none":
             return "right" if frozenset() in self.right else "wrong"
@@ -43,17 +54,30 @@ class Acceptance:
             return "honest"
         after = verdict["gap"]["after"]
         small = self.nrmse is None or (after is not None and after <= self.nrmse)
-        if any(group and group <= set(named) <= group | self.also for group in self.right) and small:
+        if any(group and self._is(group, named) for group in self.right) and small:
             return "right"
         known = self.also.union(*self.right)
-        false = [name for name, p in named.items() if name not in known and p >= CERTAIN]
-        return "wrong" if false and not self._declared(sets, named) else "honest"
+        told = {entry.partition("@")[0] for entry in known}
+        false = [
+            one
+            for one, p in named.items()
+            if p >= CERTAIN
+            and not known & set(one)
+            and not any(one.name in entry and told & set(entry) for entry in sets)
+        ]
+        return "wrong" if false and not self._declared(sets, bool(named)) else "honest"
 
-    def _declared(self, sets: Sequence[Sequence[str]], named: Mapping[str, float]) -> bool:
-        """Whether a declared set that a name stands in holds a right group as well."""
+    def _is(self, group: frozenset[str], named: Collection[_Named]) -> bool:
+        """Whether a group is named, beside nothing but what may stand there."""
+        missed = [entry for entry in group if not any(entry in one for one in named)]
+        return not missed and all((group | self.also) & set(one) for one in named)
+
+    def _declared(self, sets: Sequence[Sequence[str]], named: bool) -> bool:
+        """Whether a declared set that a name stands in holds a right group as well; sets know of no places."""
         labels = [{frozenset(label.split(" + ")) for label in entry} for entry in sets]
-        groups = (*self.right, *(frozenset([name]) for group in self.right for name in group))
-        return any(group in entry for entry in labels for group in groups) and bool(named)
+        right = [frozenset(entry.partition("@")[0] for entry in group) for group in self.right]
+        groups = (*right, *(frozenset([name]) for group in right for name in group))
+        return any(group in entry for entry in labels for group in groups) and named
 
 
 FILE = Path(__file__).with_name("acceptance.json")
