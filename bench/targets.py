@@ -9,12 +9,13 @@ from pathlib import Path
 from bench.files import OutputError, check_name
 
 
-def check_targets(*paths: str | Path | None, force: bool = False) -> None:
+def check_targets(*paths: str | Path | None, force: bool = False, option: str = "--force") -> None:
     """Refuse places that results cannot be written to, before the time is spent that making them takes.
 
     Args:
         paths: The files that will be written; None and "-" (standard output) are passed over.
         force: Let files that exist be overwritten.
+        option: What says so on the command line.
 
     Raises:
         OutputError: A folder has the name, its folder cannot be written to, two results have one name, or the file exists.
@@ -38,7 +39,7 @@ def check_targets(*paths: str | Path | None, force: bool = False) -> None:
         taken.add(resolved)
         if not force and os.path.lexists(path):
             raise OutputError(
-                f"{path} exists and is not overwritten; give another name, or --force to replace it"
+                f"{path} exists and is not overwritten; give another name, or {option} to replace it"
             )
 
 

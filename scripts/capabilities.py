@@ -73,6 +73,22 @@ def _benchmark_group(name: str, title: str) -> Capability:
 
 SEALED_SEED = "20261208"
 """Of the sealed cases that are published: a new one for every set, so that nobody has looked at its cases before."""
+MADE = (
+    (
+        "laboratory_like", "Devices, sensors and structures that no law of the bench describes, graded likewise", "lab_",
+        "laboratory-like", "",
+    ),
+    (
+        "second_laboratory", "Cases of a second author, who knew nothing of the diagnosis: structures, mechanisms and components",
+        "second_", "second-laboratory", "",
+    ),
+    (
+        "second_robots", "Cases of a second author, who knew nothing of the diagnosis: robots", "ptz vee scar hop dsk gan",
+        "second-robots/cases", " out/second-robots/answers",
+    ),
+)  # fmt: skip
+"""Cases made by a script of the name: its capability, title, beginnings of their names, folder, what follows it."""
+
 CAPABILITIES: Sequence[Capability] = (
     Capability("demo", "The main job", words("jointbench demo --json"), demo),
     _benchmark_group("native", "Native callbacks"),
@@ -207,28 +223,15 @@ CAPABILITIES: Sequence[Capability] = (
         graded,
         data=".",
     ),
-    Capability(
-        "laboratory_like",
-        "Devices, sensors and structures that no law of the bench describes, graded likewise",
-        words("python scripts/measured_cases.py lab_ --cases out/laboratory-like --json"),
-        graded,
-        before=(words("python scripts/laboratory_like.py out/laboratory-like"),),
-    ),
-    Capability(
-        "second_laboratory",
-        "Cases of a second author, who knew nothing of the diagnosis: structures, mechanisms and components",
-        words("python scripts/measured_cases.py second_ --cases out/second-laboratory --json"),
-        graded,
-        before=(words("python scripts/second_laboratory.py out/second-laboratory"),),
-    ),
-    Capability(
-        "second_robots",
-        "Cases of a second author, who knew nothing of the diagnosis: robots",
-        words(
-            "python scripts/measured_cases.py ptz vee scar hop dsk gan --cases out/second-robots/cases --json"
-        ),
-        graded,
-        before=(words("python scripts/second_robots.py out/second-robots/cases out/second-robots/answers"),),
+    *(
+        Capability(
+            name,
+            title,
+            words(f"python scripts/measured_cases.py {names} --cases out/{folder} --json"),
+            graded,
+            before=(words(f"python scripts/{name}.py out/{folder}{more}"),),
+        )
+        for name, title, names, folder, more in MADE
     ),
     Capability(
         "check",

@@ -19,11 +19,13 @@ import pytest
 from bench.cli import main
 from bench.discrepancy import Case, CaseChannel, record_from_arrays
 from bench.discrepancy.application.applying import Findings, RunOptions, apply
+from bench.discrepancy.application.forces import not_in_model
 from bench.discrepancy.application.reading import findings_of, gaps_left
 from bench.discrepancy.application.writing import model_text, ranges, snippet, write_model
 from bench.discrepancy.case.case import NominalParameter
 from bench.discrepancy.effects.channel_operators import analogue_lag
 from bench.discrepancy.effects.channel_operators import lag as digital_lag
+from bench.discrepancy.model.model_units import declared_units, in_model_units
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.replay.linear_replay import LinearReplay
 from bench.discrepancy.replay.verification import verify
@@ -286,6 +288,40 @@ def test_an_effect_on_a_linear_model_closes_in_plain_mujoco(tmp_path, name):
     (figure,) = verified(case, [found]).figures
     assert figure.before > 0.08
     assert figure.after < 0.1 * figure.before + 0.005, figure
+
+
+def test_a_case_in_other_units_is_run_as_it_was_meant(tmp_path):
+    """Units of nominal.json are those of its columns, not of MuJoCo."""
+    wrong, before_step, found = STAGE_EFFECTS["cubic_stiffness"]
+    case = stage_case(tmp_path, wrong or (lambda spec: None), before_step)
+    factors = {
+        c.name: {"N": ("kN", 1e-3), "m": ("mm", 1e3), "m/s^2": ("g", 1.0 / 9.80665)}[c.unit]
+        for c in case.channels
+    }
+
+    def scaled(record):
+        values = {name: samples * factors[name][1] for name, samples in record.values.items()}
+        return replace(record, values=values)
+
+    other = replace(
+        case,
+        channels=tuple(replace(c, unit=factors[c.name][0]) for c in case.channels),
+        identification=tuple(map(scaled, case.identification)),
+        validation=tuple(map(scaled, case.validation)),
+        options={**case.options, "limits": {"displacement": 8.0}},
+    )
+    (one,), (same,) = verified(case, [found]).figures, verified(other, [found]).figures
+    assert (same.before, same.after) == pytest.approx((one.before, one.after), rel=1e-9)
+    converted, said = in_model_units(other)
+    assert converted.options["limits"] == {"displacement": pytest.approx(0.008)}
+    assert len(said) == len(case.channels)
+    assert declared_units(other)["displacement"] == ("mm", pytest.approx(1e-3))
+
+
+def test_what_follows_a_channel_is_said_not_to_be_in_the_model():
+    text = not_in_model([effect("scheduled_coulomb_friction", "guide"), effect("gap", "guide")])
+    assert "left to your loop" in text
+    assert "gap" not in text
 
 
 ARM_EFFECTS = {

@@ -57,6 +57,25 @@ def test_dialects_of_headings_say_the_same(columns):
     assert len(found) == 4
 
 
+def test_a_sensor_is_known_whatever_its_capitals_and_a_motor_without_a_column_is_told(tmp_path, capsys):
+    sensed = STAGE.replace(
+        "</actuator>",
+        '<motor name="brake" joint="guide"/></actuator><sensor><jointpos name="weg" joint="guide"/></sensor>',
+    )
+    model = tmp_path / "stage.xml"
+    model.write_text(sensed)
+    found = match_columns(("Shaker", "Weg"), mujoco.MjModel.from_xml_string(sensed), None)
+    assert {m.column: m.name for m in found.matches} == {"Shaker": "shaker", "Weg": "weg"}
+    t = np.arange(0.0, 4.0, 0.005)
+    for k in (1, 2):
+        table = np.column_stack([t, np.sin(7.0 * t + k), 1e-3 * np.sin(7.0 * t + k - 0.3)])
+        np.savetxt(tmp_path / f"log_{k}.csv", table, delimiter=",", header="time,Shaker,Weg", comments="")
+    logs = [str(tmp_path / f"log_{k}.csv") for k in (1, 2)]
+    assert main(["init", *logs, str(model), "-o", str(tmp_path / "case"), "--unit", "Shaker=N", "Weg=m"]) == 0
+    told = capsys.readouterr()
+    assert "actuator 'brake' has no column: nothing drives it" in told.out + told.err
+
+
 def test_one_map_teaches_the_other_columns(capsys):
     found, _ = _matched(
         ["position_Pan", "command_Pan", "velocity_Pan"], {"position_Pan": "shoulder_joint.position"}

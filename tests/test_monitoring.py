@@ -196,3 +196,22 @@ def test_the_command_tells_the_change(tmp_path, capsys):
     assert "changed" in capsys.readouterr().out
     assert main(["monitor", str(path), "--displacement", "strok", "--force", "load"]) == 2
     assert "stroke" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ((), "as in --unit CHANNEL=mm"),
+        (("--unit", "s=N", "F=N"), "--unit s=… says which"),
+        (("--unit", "s=mm", "F=N", "--figure"), "--overwrite to replace it"),
+    ],
+)
+def test_the_command_says_which_option_is_missing(tmp_path, capsys, more, words):
+    file, figure = tmp_path / "service.csv", tmp_path / "course.png"
+    t = np.arange(0.0, 3.0, 0.01)
+    table = np.column_stack([t, np.sin(t), np.cos(t)])
+    np.savetxt(file, table, delimiter=",", header="time,s,F", comments="")
+    figure.write_text("a picture")
+    options = [*more, str(figure)] if more[-1:] == ("--figure",) else more
+    assert main(["monitor", str(file), "--displacement", "s", "--force", "F", *options]) == 2
+    assert words in capsys.readouterr().err

@@ -189,17 +189,20 @@ def test_signals_are_designed_without_records_and_keep_their_limits(arm, tmp_pat
     ]
     assert main([*command, "--rate", "200"]) == 2
     assert "nothing limits 'command'" in capsys.readouterr().err
-    nominal |= {"limits": {"command": 0.8, "position": 0.9}, "sample_rate_hz": 200}
+    for channel in ("command", "position"):
+        nominal["channels"][channel]["unit"] = "deg"
+    largest, reach = np.degrees([0.8, 0.9])
+    nominal |= {"limits": {"command": largest, "position": reach}, "sample_rate_hz": 200}
     (source / "nominal.json").write_text(json.dumps(nominal))
     assert main(command) == 0
     told = json.loads(capsys.readouterr().out)
     information = [one["information"] for one in told["tried"]]
     assert information == sorted(information, reverse=True)
-    assert all(one["responses"]["position"] <= 0.9 for one in told["tried"])
+    assert all(0.1 * reach < one["responses"]["position"] <= reach for one in told["tried"])
     planned = read_case(folder, planned=True)
     assert len({record.name for record in (*planned.identification, *planned.validation)}) == 3
     for record in planned.identification:
-        assert 0.0 < np.abs(record.values["command"]).max() <= 0.8 + 1e-9
+        assert 0.1 * largest < np.abs(record.values["command"]).max() <= largest + 1e-6
         # what is commanded starts from rest
         assert abs(record.values["command"][0]) < 1e-9
     with pytest.raises(ValueError, match="lacks a column"):

@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
@@ -147,7 +148,7 @@ class Diagnose:
             for line in made.assumed:
                 told.print(f"assumed: {line}", markup=False, highlight=False)
             found = _diagnosed(self, case, stage)
-            files = Files(f"--model {models[0]}", self._verdict)
+            files = Files(f"--model {quote(str(models[0]))}", self._verdict)
             document, written, problem = self._results(found, stage, made.assumed, files)
         self._told(found, document, written, problem, files)
 

@@ -52,7 +52,7 @@ class Monitor:
         from bench.monitoring import MonitorSettings, monitor_record
         from bench.targets import check_targets
 
-        check_targets(self.figure, force=self.force_overwrite)
+        check_targets(self.figure, force=self.force_overwrite, option="--overwrite")
         settings = MonitorSettings(learning=self.learning, change=self.change, run_length=self.run_length)
         record = self._read()
         x, v = record[self.displacement], record[self.velocity]
@@ -75,20 +75,30 @@ class Monitor:
         """The record in SI units, with a velocity."""
         import numpy as np
 
-        from bench.errors import ParameterError
+        from bench.errors import ParameterError, RecordingError, UnitError
         from bench.record_files import read_recording
 
         pairs = [text.partition("=") for text in self.unit]
         wrong = [name for name, sign, unit in pairs if not (name and sign and unit)]
         if wrong:
             raise ParameterError(f"--unit {wrong[0]} came; CHANNEL=UNIT is expected, as force=kN")
-        record = read_recording(
-            self.record, units={name: unit for name, _, unit in pairs}, gaps="interpolate"
-        ).to_si()
-        (
-            record.channel(self.displacement),
-            record.channel(self.force),
-        )  # named with the channels there are, if missing
+        try:
+            record = read_recording(
+                self.record, units={name: unit for name, _, unit in pairs}, gaps="interpolate"
+            ).to_si()
+        except RecordingError as error:
+            told = str(error).partition(" has no unit;")
+            raise (
+                ParameterError(f"{told[0]} has no unit; add it, as in --unit CHANNEL=mm")
+                if told[1]
+                else error
+            ) from None
+        for name, units in ((self.displacement, ("m", "rad")), (self.force, ("N", "N m"))):
+            if record.channel(name).unit not in units:  # named with the channels there are, if missing
+                raise UnitError(
+                    f"channel '{name}' is in {record.channel(name).unit}; {' or '.join(units)}, or a unit of that dimension, is expected: "
+                    f"--unit {name}=… says which"
+                )
         if self.velocity in record.names:
             return record
         unit = f"{record.channel(self.displacement).unit}/s"

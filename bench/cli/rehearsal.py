@@ -94,7 +94,8 @@ class Design:
 
     def __call__(self) -> None:
         """Run the command."""
-        from bench.discrepancy.rehearsal.designing import design_signals, write_design
+        from bench.discrepancy.rehearsal.designed import write_design
+        from bench.discrepancy.rehearsal.designing import design_signals
         from bench.targets import check_target_folder
 
         check_target_folder(self.output, force=self.force)

@@ -224,8 +224,17 @@ OF_A_RECORD = {
     "timed_force": "its windows are those of the first record, others have their own",
     "harmonic_force": "its phase is that of the first record, others have their own",
     "record_dependent_": "its size is the mean of that in the records",
+    "scheduled_": "it stands in the model at the reference s0 alone; to follow the channel is left to your loop",
 }
-"""What is a record's own in an effect, by the beginning of its name."""
+"""What of an effect the corrected model does not hold, since it is a record's own or follows a channel, by the beginning of its name."""
+
+
+def not_in_model(effects: Sequence[NamedEffect]) -> str:
+    """What of some effects the corrected model does not hold, in words; empty where it holds all."""
+    pairs = (
+        (e.name, text) for e in effects for start, text in OF_A_RECORD.items() if e.name.startswith(start)
+    )
+    return "; ".join(f"of {name}, {text}" for name, text in pairs)
 
 
 def element(target: Target, effect: NamedEffect) -> Change:

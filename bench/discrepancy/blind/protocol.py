@@ -32,6 +32,7 @@ from bench.discrepancy.blind.robot_cases import draw_robot_case
 from bench.discrepancy.blind.schema import ANSWER_LIMITS, ProtocolDocument
 from bench.discrepancy.case.case import Case, CaseChannel
 from bench.documents import parse_json
+from bench.documents.loading import load_document
 from bench.errors import BenchError, FileFormatError, ParameterError
 from bench.files import together, write_bytes, write_text
 from bench.progress import Tell
@@ -209,6 +210,11 @@ def run_blind(
         for path, target in zip(cases, targets, strict=True)
         if again or not target.is_file()
     ]
+    for target in () if again else [t for t in targets if t.is_file()]:
+        if "verdict" not in load_document(target):
+            raise FileFormatError(
+                f"'{target}' is no verdict of an earlier run (answers?); give a folder of its own for results, or --again to replace it"
+            )
     if len(tasks) < len(cases):
         progress(f"{len(cases) - len(tasks)} results are there already")
     for line in _spread(_run_one, tasks, workers):

@@ -149,10 +149,15 @@ def _labelled(case: Case, channels: Mapping[str, Conversion], parameters: Mappin
             entry, unit=done.unit, value=entry.value * done.factor, std=entry.std * done.factor, each=each
         )
 
+    stated = dict(case.options)
+    if isinstance(limits := stated.get("limits"), Mapping):
+        factors = {name: abs(done.factor) for name, done in channels.items()}
+        stated["limits"] = {name: most * factors.get(str(name), 1.0) for name, most in limits.items()}
     return replace(
         case,
         channels=tuple(channel(entry) for entry in case.channels),
         parameters=tuple(parameter(entry) for entry in case.parameters),
+        options=stated,
     )
 
 

@@ -108,6 +108,9 @@ def draft(
     matching = _heeded(matching, articulated)
     assumed = [f"column {match.told}" for match in matching.matches]
     assumed += [f"column {column} is not used: {why}" for column, why in matching.unused.items()]
+    driven = {match.name for match in matching.matches if match.kind == "actuator"}
+    names = [model.compiled.actuator(u).name for u in range(model.compiled.nu)]
+    assumed += [f"actuator '{name}' has no column: nothing drives it" for name in names if name not in driven]
     parameters = assumed_parameters(model.compiled, own, articulated=articulated)
     assumed += [p.told for p in parameters]
     channels: dict[str, Any] = {"time": {"unit": "s"}} if articulated else {}

@@ -6,6 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from shlex import quote
 
 import mujoco
 
@@ -223,8 +224,8 @@ def _one(
 ) -> tuple[Match | None, str]:
     """What a heading stands for, or why nothing."""
     column = heading.column
-    if column in _names(model, "sensor"):
-        return Match(column, "sensor", column, how="the sensor of that name"), ""
+    if sensor := _called(column, _names(model, "sensor")):
+        return Match(column, "sensor", sensor, how="the sensor of that name"), ""
     if column in _names(model, "actuator") and column not in _joints(model):
         return _driving(heading, column, model, "the actuator of that name")
     joint, how = _joint_of(heading, others, model)
@@ -245,6 +246,12 @@ def _one(
     if not heading.quantity and column not in _joints(model):
         return None, f"says no quantity of joint '{joint}'"
     return Match(column, "joint", joint, heading.quantity or "position", how=how), ""
+
+
+def _called(column: str, names: Sequence[str]) -> str:
+    """The name that a column bears, or bears but for capitals where that is one alone; empty where it bears none."""
+    like = [name for name in names if name.casefold() == column.casefold()]
+    return column if column in names else like[0] if len(like) == 1 else ""
 
 
 def _joint_of(heading: _Heading, others: Sequence[_Heading], model: mujoco.MjModel) -> tuple[str, str]:
@@ -309,9 +316,11 @@ def _check(found: Sequence[Match], model: mujoco.MjModel, columns: Sequence[str]
     if any(match.kind != "actuator" for match in found):
         return
     listed = ", ".join(f"'{column}'" for column in list(columns)[:12])
+    taken = {match.column for match in found}
+    free = next((column for column in columns if column not in taken), "COLUMN")
     raise ParameterError(
         f"no column bears the name of a joint or sensor of the model; columns: {listed}; joints: {', '.join(_joints(model)) or 'none'}. "
-        f"Say which is which, as in --map {columns[0] if columns else 'COLUMN'}={(_joints(model) or ['JOINT'])[0]}.position"
+        f"Say which is which, as in --map {quote(free)}={(_joints(model) or ['JOINT'])[0]}.position"
         + _by_order(columns, model)
     )
 

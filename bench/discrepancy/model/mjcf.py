@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import mujoco
 import numpy as np
 
 from bench import native
@@ -73,6 +74,19 @@ def mjcf_structure(case: Case, *, settings: DiagnosisSettings) -> Structure:
     )
 
 
+def _refuse_loose(case: Case, model: mujoco.MjModel) -> None:
+    """Refuse joints that are neither slides nor hinges, by name."""
+    kinds = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
+    loose = [
+        model.joint(i).name or f"number {i}" for i in range(model.njnt) if int(model.jnt_type[i]) not in kinds
+    ]
+    if loose:
+        raise ModelError(
+            f"'{case.rig}' has the free or ball joint '{loose[0]}'; a diagnosis takes slides and hinges on a fixed or prescribed base: "
+            "hang the robot up, lock the joint, or cut out the limb that was tested"
+        )
+
+
 def _without_couplings(
     case: Case,
     rigs: tuple[Rig, Rig],
@@ -83,6 +97,7 @@ def _without_couplings(
 ) -> tuple[Structure, LinearRig]:
     """The structure on all joints that channels depend on, and its matrices; `rigs` are the user's own and the plain one."""
     own, rig = rigs
+    _refuse_loose(case, rig.model)
     structural = [_structural(name, rig) for name in names]
     parameters = [name for name in structural if not name.startswith("structure/frictionloss/")]
     try:

@@ -11,7 +11,6 @@ References:
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -26,6 +25,7 @@ from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.case.reading import GROUPS, read_case
 from bench.discrepancy.case.schema import NominalDocument
 from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.model.model_units import declared_units, in_model_units
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.inputs import input_of
@@ -35,15 +35,13 @@ from bench.discrepancy.precheck.information import Told, effects_told, parameter
 from bench.discrepancy.precheck.joint_information import joints_told
 from bench.discrepancy.precheck.joints import admitted_joints
 from bench.discrepancy.precheck.settings import CheckSettings
+from bench.discrepancy.rehearsal.designed import NAMES, Designed, Tried
 from bench.discrepancy.rehearsal.placing import SETTINGS as PLACING
 from bench.discrepancy.rehearsal.truth import ModelLaboratory
 from bench.discrepancy.settings import DEFAULT
 from bench.errors import BenchError, ParameterError, SimulationError
-from bench.files import together, write_text
 from bench.rig.actuators import commanded
 from bench.signals import Multisine
-
-NAMES = ("identification", "identification_2", "validation")
 
 
 @dataclass(frozen=True)
@@ -61,54 +59,6 @@ class DesigningSettings:
 
 
 SETTINGS = DesigningSettings()
-
-
-@dataclass(frozen=True)
-class Tried:
-    """A signal at a size that the rig can do.
-
-    Attributes:
-        label: What it is, in words.
-        information: What its record would tell [nat].
-        commands: Largest magnitude by command channel.
-        responses: The same by response channel.
-        record: Commands and predicted responses.
-    """
-
-    label: str
-    information: float
-    commands: dict[str, float]
-    responses: dict[str, float]
-    record: CaseRecord
-
-
-@dataclass(frozen=True)
-class Designed:
-    """Signals for a case.
-
-    Attributes:
-        tried: All that were weighed, the most telling first.
-        chosen: Labels of those for `NAMES`.
-        inputs: Command channels and their units.
-    """
-
-    tried: tuple[Tried, ...]
-    chosen: tuple[str, ...]
-    inputs: tuple[tuple[str, str], ...]
-
-    @property
-    def records(self) -> dict[str, CaseRecord]:
-        """Records by name of their file."""
-        found = {one.label: one.record for one in self.tried}
-        return {name: found[label] for name, label in zip(NAMES, self.chosen, strict=True)}
-
-    def to_json(self) -> dict[str, Any]:
-        """As JSON values."""
-        tried = [
-            {"label": t.label, "information": t.information, "commands": t.commands, "responses": t.responses}
-            for t in self.tried
-        ]
-        return {"chosen": dict(zip(NAMES, self.chosen, strict=True)), "tried": tried}
 
 
 def design_signals(
@@ -134,7 +84,8 @@ def design_signals(
         ParameterError: Nothing states the sample rate or the limit of a command, or no signal keeps the limits.
         ModelError: The rig is no MJCF.
     """
-    known = read_case(folder, planned=True)
+    declared = read_case(folder, planned=True)
+    units, (known, _) = declared_units(declared), in_model_units(declared)
     step = 1.0 / _rate(folder, known, rate)
     samples = round(seconds / step)
     if samples < 1000:
@@ -164,28 +115,9 @@ def design_signals(
     first, rest = tried[0], tried[1 : 1 + DEFAULT.next_test.finalists]
     second = max(rest, key=lambda one: _information(laboratory, (first.record, one.record), wanted, seed))
     judge = next(one for one in tried[1:] if one is not second)
-    inputs = tuple((c.name, c.unit) for c in known.channels if c.role != "response")
-    return Designed(tuple(tried), (first.label, second.label, judge.label), inputs)
-
-
-def write_design(made: Designed, source: Path, folder: Path) -> list[Path]:
-    """Write the case with its signals: nominal.json and the model as they were, and a CSV of the commands for each record."""
-    nominal = source / "nominal.json"
-    rig = str(json.loads(nominal.read_text(encoding="utf-8"))["rig"])
-    folder.mkdir(parents=True, exist_ok=True)
-    written = [folder / "nominal.json", folder / rig]
-    with together():
-        for path, text in zip(
-            written, (nominal.read_text("utf-8"), (source / rig).read_text("utf-8")), strict=True
-        ):
-            write_text(path, text)
-        for name, record in made.records.items():
-            headings = ["time [s]", *(f"{channel} [{unit}]" for channel, unit in made.inputs)]
-            columns = np.column_stack([record.time, *(record.values[channel] for channel, _ in made.inputs)])
-            rows = [",".join(f"{x:.9g}" for x in row) for row in columns]
-            written.append(folder / f"{name}.csv")
-            write_text(written[-1], "\n".join([",".join(headings), *rows]) + "\n")
-    return written
+    inputs = {c.name: units[c.name] for c in known.channels if c.role != "response"}
+    shown = tuple(one.shown_in(units) for one in tried)
+    return Designed(shown, (first.label, second.label, judge.label), inputs)
 
 
 def _rate(folder: Path, case: Case, asked: float) -> float:

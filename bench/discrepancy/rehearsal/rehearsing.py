@@ -14,6 +14,7 @@ import numpy as np
 from bench.discrepancy.application.applying import Findings
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.diagnosis import diagnose
+from bench.discrepancy.model.model_units import in_model_units
 from bench.discrepancy.rehearsal.placing import EffectSite, sites
 from bench.discrepancy.rehearsal.truth import ModelLaboratory
 from bench.discrepancy.verdict import NamedEffect, Verdict
@@ -174,6 +175,7 @@ def rehearse(
     if not sizes or min(sizes) <= 0.0 or max(sizes) > 2.0:
         raise ParameterError(f"sizes {tuple(sizes)} came; parts of a response between 0 and 2 are expected")
     ordered = tuple(sorted(set(sizes), reverse=True))
+    case, _ = in_model_units(case)
     laboratory = ModelLaboratory.of(case)
     print_of = _fingerprint(laboratory, ordered, seed)
     done = Rehearsal(case.name, ordered, fingerprint=print_of)

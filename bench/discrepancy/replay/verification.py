@@ -20,12 +20,15 @@ from bench.discrepancy.application.applying import (
     as_tested,
     specification,
 )
+from bench.discrepancy.application.forces import not_in_model
 from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE as ARTICULATED
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
+from bench.discrepancy.model.model_units import in_model_units
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.replay.figures import Figure, WholeRun
 from bench.discrepancy.replay.joint_replay import JointReplay
 from bench.discrepancy.replay.linear_replay import LinearReplay
 from bench.discrepancy.verdict import Gap, of_runs
@@ -47,45 +50,6 @@ class VerificationSettings:
     refinements: tuple[int, ...] = (2, 4, 10, 20)
     converged: int = 10
     matters: float = 0.1
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One judged coordinate in the user's simulator.
-
-    Attributes:
-        dof: Degree of freedom.
-        before: NRMSE with the model as it came, as the user runs it.
-        after: With the corrected one.
-        diagnosis: What the diagnosis says of the latter.
-        floor: What noise alone leaves.
-    """
-
-    dof: str
-    before: float
-    after: float
-    diagnosis: float
-    floor: float
-
-    @property
-    def short(self) -> float:
-        """Part of the diagnosis's figure by which the corrected model misses it."""
-        return self.after / max(self.diagnosis, 1e-12) - 1.0
-
-
-@dataclass(frozen=True)
-class WholeRun:
-    """One joint while all are free at once, as where the model is used.
-
-    Attributes:
-        dof: The joint.
-        before: NRMSE with the model as it came, from the measured states of windows where no servo holds it.
-        after: With the corrected one.
-    """
-
-    dof: str
-    before: float
-    after: float
 
 
 @dataclass(frozen=True)
@@ -199,6 +163,7 @@ def verify(
         ModelError: The model is none that the judging records can be run with.
     """
     settings = settings or VerificationSettings()
+    case, _ = in_model_units(case)
     articulated = is_articulated(findings, case)
     replay = replay_of(path, case, articulated=articulated, findings=findings)
     nothing = Findings(())
@@ -233,6 +198,8 @@ def verify(
     own = root_mean_square(before[widest] - errors(nothing, converged, (widest,))[widest])
     out = replace(out, own_share=own)
     if _short(found) > settings.short:
+        if lacking := not_in_model(findings.effects):
+            return replace(out, remedy=f"{_missed(found)}: {lacking}")
         return _remedied(out, figures, settings, progress)
     least = min(found, key=lambda f: f.short)
     return out if least.short >= -settings.short else replace(out, less=_less(out, least, figures, settings))
@@ -309,14 +276,17 @@ def _remedied(
             best, label = tried, name
         if _short(tried) <= settings.short:
             break
-    short = 100.0 * _short(out.figures)
+    words = _missed(out.figures)
     if not label:
-        words = f"the corrected model misses the diagnosis by {short:.0f} %, and neither a smaller step nor RK4 brings it nearer"
+        words += ", and neither a smaller step nor RK4 brings it nearer"
     else:
         worst = next(f for f in best if f.dof == out.worst.dof)
-        words = f"the corrected model misses the diagnosis by {short:.0f} % at your step; {label} gives {worst.after:.3g}"
-        words += _rest(best, settings)
+        words += f" at your step; {label} gives {worst.after:.3g}" + _rest(best, settings)
     return replace(out, remedy=words, better=best if label else ())
+
+
+def _missed(figures: Sequence[Figure]) -> str:
+    return f"the corrected model misses the diagnosis by {100.0 * _short(figures):.0f} %"
 
 
 def _rest(best: Sequence[Figure], settings: VerificationSettings) -> str:

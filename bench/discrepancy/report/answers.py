@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import NamedTuple
 
 from bench.discrepancy.case.case import Case
@@ -179,7 +180,8 @@ class Files(NamedTuple):
     def of(cls, case: Case, verdict: str = "") -> Files:
         """The case's own folder and model."""
         folder = Path(case.folder or ".")
-        own = f"--model {folder / case.rig} --case {folder}" if case.rig.endswith(".xml") else ""
+        own = f"--model {quote(str(folder / case.rig))} --case {quote(str(folder))}"
+        own = own if case.rig.endswith(".xml") else ""
         return cls(own, verdict)
 
 
@@ -191,7 +193,7 @@ def next_steps(verdict: Verdict, files: Files) -> tuple[NextStep, ...]:
         files: What the commands name.
     """
     steps = []
-    file = files.verdict or "verdict.json"
+    file = quote(files.verdict or "verdict.json")
     unwritten = "" if files.verdict else f" (--json {file} writes the verdict)"
     if verdict.named or verdict.nearest:
         nearest = "" if verdict.named else " --nearest"

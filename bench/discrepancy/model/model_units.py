@@ -1,0 +1,61 @@
+"""A case in the units of its model, which whatever simulates it works in, and what its channels were declared in."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from bench.discrepancy.case.case import Case
+from bench.discrepancy.case.mjcf_units import expected_units
+from bench.discrepancy.case.rig_units import in_coherent_units
+from bench.discrepancy.case.unit_conversion import conversion_of, converted
+from bench.discrepancy.model.mjcf_file import rig_of
+
+
+class DeclaredUnit(NamedTuple):
+    """What a channel of a case was declared in.
+
+    Attributes:
+        unit: Its unit.
+        factor: A number in the unit of the model over the same in this one.
+    """
+
+    unit: str
+    factor: float
+
+
+def in_model_units(case: Case) -> tuple[Case, tuple[str, ...]]:
+    """A case in the units of its model, and what was converted, in words; one that is in them stays as it is.
+
+    Args:
+        case: As read.
+
+    Raises:
+        UnitError: A declared unit is unknown, or of another dimension than the model says.
+        ModelError: The model cannot be read.
+    """
+    if not case.rig.endswith(".xml"):
+        return in_coherent_units(case)
+    return converted(case, *expected_units(case, rig_of(case)))
+
+
+def declared_units(case: Case) -> dict[str, DeclaredUnit]:
+    """Units that the channels of a case on an MJCF were declared in, by name; the model's own where none was.
+
+    Args:
+        case: As read.
+
+    Raises:
+        UnitError: As `in_model_units`.
+    """
+    expected, _ = expected_units(case, rig_of(case))
+    found = {
+        c.name: conversion_of("channel", c.name, c.unit, expected[c.name])
+        for c in case.channels
+        if c.name in expected
+    }
+    return {
+        c.name: DeclaredUnit(done.declared, done.factor)
+        if (done := found.get(c.name))
+        else DeclaredUnit(c.unit, 1.0)
+        for c in case.channels
+    }
