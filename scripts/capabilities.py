@@ -36,6 +36,7 @@ from diagnosis_figures import (
     sealed,
     ten_minutes,
 )
+from made_cases import MADE
 from robot_figures import robots
 
 
@@ -73,22 +74,6 @@ def _benchmark_group(name: str, title: str) -> Capability:
 
 SEALED_SEED = "20261208"
 """Of the sealed cases that are published: a new one for every set, so that nobody has looked at its cases before."""
-MADE = (
-    (
-        "laboratory_like", "Devices, sensors and structures that no law of the bench describes, graded likewise", "lab_",
-        "laboratory-like", "",
-    ),
-    (
-        "second_laboratory", "Cases of a second author, who knew nothing of the diagnosis: structures, mechanisms and components",
-        "second_", "second-laboratory", "",
-    ),
-    (
-        "second_robots", "Cases of a second author, who knew nothing of the diagnosis: robots", "ptz vee scar hop dsk gan",
-        "second-robots/cases", " out/second-robots/answers",
-    ),
-)  # fmt: skip
-"""Cases made by a script of the name: its capability, title, beginnings of their names, folder, what follows it."""
-
 CAPABILITIES: Sequence[Capability] = (
     Capability("demo", "The main job", words("jointbench demo --json"), demo),
     _benchmark_group("native", "Native callbacks"),
