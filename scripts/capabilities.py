@@ -209,14 +209,8 @@ CAPABILITIES: Sequence[Capability] = (
         data=".",
     ),
     *(
-        Capability(
-            name,
-            title,
-            words(f"python scripts/measured_cases.py {names} --cases out/{folder} --json"),
-            graded,
-            before=(words(f"python scripts/{name}.py out/{folder}{more}"),),
-        )
-        for name, title, names, folder, more in MADE
+        Capability(name, title, words(command), graded, before=(words(making),))
+        for name, (title, command, making) in MADE.items()
     ),
     Capability(
         "check",

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-MADE = (
-    (
-        "laboratory_like", "Devices, sensors and structures that no law of the bench describes, graded likewise", "lab_",
-        "laboratory-like", "",
+GRADED = "python scripts/measured_cases.py {} --cases out/{} --json"
+"""Command that diagnoses and grades cases, by the beginnings of their names and their folder."""
+MADE = {
+    "laboratory_like": (
+        "Devices, sensors and structures that no law of the bench describes, graded likewise",
+        GRADED.format("lab_", "laboratory-like"),
+        "python scripts/laboratory_like.py out/laboratory-like",
     ),
-    (
-        "second_laboratory", "Cases of a second author, who knew nothing of the diagnosis: structures, mechanisms and components",
-        "second_", "second-laboratory", "",
+    "second_laboratory": (
+        "Cases of a second author, who knew nothing of the diagnosis: structures, mechanisms and components",
+        GRADED.format("second_", "second-laboratory"),
+        "python scripts/second_laboratory.py out/second-laboratory",
     ),
-    (
-        "second_robots", "Cases of a second author, who knew nothing of the diagnosis: robots", "ptz vee scar hop dsk gan",
-        "second-robots/cases", " out/second-robots/answers",
+    "second_robots": (
+        "Cases of a second author, who knew nothing of the diagnosis: robots",
+        GRADED.format("ptz vee scar hop dsk gan", "second-robots/cases"),
+        "python scripts/second_robots.py out/second-robots/cases out/second-robots/answers",
     ),
-)  # fmt: skip
-"""Cases made by a script of the name: its capability, title, beginnings of their names, folder, what follows it."""
+}
+"""By name: title of the capability, its command, and the command that makes its cases."""
