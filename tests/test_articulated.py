@@ -426,8 +426,11 @@ def test_the_next_test_tells_two_explanations_apart_within_what_the_arm_has_show
         np.abs(trajectory.position[200:]).max(axis=0) < 1.01 * np.abs(shown.position).max(axis=0) + 1e-3
     ).all()
     assert (np.abs(speed[200:]).max(axis=0) < 1.05 * np.abs(shown.velocity).max(axis=0)).all()
-    lines = trajectory.as_csv(list(KP)).splitlines()
-    assert lines[0] == "time,shoulder,elbow"
+    # from rest to rest, where it began
+    np.testing.assert_allclose(trajectory.position[-1], trajectory.position[0], atol=1e-6)
+    assert (np.abs(speed[-1]) < 0.05 * np.abs(speed).max()).all()
+    lines = trajectory.as_csv([(joint, "rad") for joint in KP]).splitlines()
+    assert lines[0] == "time [s],shoulder [rad],elbow [rad]"
     assert len(lines) == len(trajectory.time) + 1
 
 

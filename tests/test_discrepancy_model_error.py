@@ -468,6 +468,8 @@ def test_what_there_is_no_time_for_is_left_out_and_said():
         assert verdict.verdict in {"effect", "unknown"}
         note = next(text for text in verdict.warnings if "no time for" in text)
         assert "2 effects together" in note
+        # rivals that were never tried may be the cause
+        assert all(e.probability <= 0.5 for e in (*verdict.named, *verdict.ranking))
 
 
 @pytest.mark.slow

@@ -218,7 +218,8 @@ class Diagnose:
                 planned = getattr(diagnosis, "next_test", None)
                 if self.next_test is not None and planned is not None:
                     write_text(
-                        self.next_test, planned.as_csv([joint.name for joint in diagnosis.problem.joints])
+                        self.next_test,
+                        planned.as_csv([(joint.name, joint.unit) for joint in diagnosis.problem.joints]),
                     )
         except Exception as error:  # whatever a figure ran into: the verdict is told and kept
             problem = OutputError(f"the report of this verdict cannot be written: {error}")

@@ -203,6 +203,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     near = _nearest(case, problem, finding, closest, found, rng) if kind == "unknown" else {}
     ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *ranking)
     stated, sharp, nominal = problem.noise_stated, not finding.coarse, nominal_estimates(final)
+    hurried = bool(how.deadline.skipped)
     judged = complete(found, sharp=sharp, stated=stated, settings=how.settings.judgement)
     verdict = Verdict(
         verdict=kind,
@@ -231,6 +232,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         settings=changed(how.settings),
         **near,
     )
+    verdict = verdict.in_haste() if hurried else verdict
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
 
 

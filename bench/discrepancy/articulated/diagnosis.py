@@ -131,6 +131,7 @@ def diagnose_articulated(
     if not _accurate(problem, found, settings):  # with what is named, long steps tell something else
         found = asked(ArticulatedProblem.of(case, model, case.identification, settings, deadline))
     problem, fits, final, verdict = found.problem, found.fits, found.final, found.verdict
+    verdict = verdict.in_haste() if deadline.skipped else verdict
     verdict = replace(
         verdict,
         warnings=(

@@ -40,10 +40,10 @@ class Trajectory(NamedTuple):
     time: Array
     position: Array
 
-    def as_csv(self, names: Sequence[str]) -> str:
-        """The trajectories as a table: time, then a column for every joint."""
+    def as_csv(self, joints: Sequence[tuple[str, str]]) -> str:
+        """The trajectories as a table: time, then a column for every joint, given by its name and the unit of its coordinate."""
         text = io.StringIO()
-        header = ",".join(["time", *names])
+        header = ",".join(["time [s]", *(f"{name} [{unit}]" for name, unit in joints)])
         np.savetxt(
             text,
             np.column_stack([self.time, self.position]),
@@ -118,7 +118,8 @@ def _candidates(
     low, high, fast = _shown(problem)
     middle, reach = 0.5 * (low + high), 0.5 * (high - low)
     asked = sorted({placed.joint for f in (first, second) for placed in f.hypothesis})
-    fade = np.sin(0.5 * np.pi * np.minimum(time / settings.ramp, 1.0)) ** 2
+    ends = np.minimum(time, time[-1] - time)  # from rest to rest
+    fade = np.sin(0.5 * np.pi * np.minimum(ends / settings.ramp, 1.0)) ** 2
     rest = np.array([record.joints[j].position[0] for record in problem.records[:1] for j in range(len(low))])
     groups = [("all joints", list(range(len(low)))), *((problem.joints[j].name, [j]) for j in asked)]
     for label, moving in groups:
