@@ -123,7 +123,8 @@ def diagnose_articulated(
         return explained(problem, placements(problem, catalogue), question)
 
     found = asked(problem)
-    held = _read_as_held(case, found)
+    steps_kept = all(a.step == b.step for a, b in zip(told.identification, case.identification, strict=True))
+    held = _read_as_held(case, found) if steps_kept else None  # of samples that were thinned none was held
     if held is not None and deadline.allows("once more, the inputs read as held between their samples"):
         progress("once more, the inputs read as held between their samples")
         case, notes = held, (*notes, HELD)

@@ -195,8 +195,8 @@ class _Standing:
 
     def settle(self, candidates: Sequence[PlacedOnJoint]) -> None:
         """Go over to the plainest of what predicts as well where something is left, and drop what closes nothing beside the others."""
-        problem = self.problem
-        if not self.left.whole:
+        problem, open_end = self.problem, not self.left.whole
+        if open_end:
             self.fits += with_dry_friction(problem, candidates, self.final)
             plain = simplest(self.fits, self.final, self._alike())
             plain = without_the_idle(problem, self.fits, plain, self.predicted)
@@ -204,7 +204,7 @@ class _Standing:
                 self.fits += rivals_beside(problem, self.fits, self.final, plain)
             self._go_over_to(plain)
         self.fits += without_some(problem, self.fits, self.rungs, self.predictions)
-        if not self.left.whole:
+        if open_end:
             self._go_over_to(without_the_idle(problem, self.fits, self.final, self.predicted))
             self.near = self._alike()
 
