@@ -116,6 +116,9 @@ def test_answers_of_unknown_and_of_none_name_no_effect():
     assert told["Where"] == "elbow, elbow_q (90 %, 1 to 5 Hz)"
     assert told["Which"] == "none of the catalogue; nearest: coulomb_friction (elbow)"
     assert next_steps(unknown, FILES)[0].command.endswith("--nearest")
+    # of logs there is no case folder yet, which the command that applies runs its records from
+    drafted = FILES._replace(draft="jointbench init run.csv arm.xml -o case")
+    assert [step.command for step in next_steps(VERDICT, drafted)][:1] == [drafted.draft]
     none = replace(VERDICT, verdict="none", named=(), locations=())
     assert dict(answers(none))["Which"] == "no effect is missing"
     assert not any(step.command for step in next_steps(none, FILES))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
@@ -110,6 +110,20 @@ class Diagnose:
                 "jointbench diagnose run.csv model.xml"
             )
 
+    def _draft(self, logs: Sequence[Path], model: str) -> str:
+        """The command that keeps the case of some logs in the folder ``case``."""
+        said: dict[str, Sequence[object]] = {
+            "--map": self.map, "--unit": self.unit, "--judge": self.judge, "--assume": self.assume,
+            "--rate": (self.rate,) if self.rate else (),
+        }  # fmt: skip
+        options = [
+            text
+            for name, values in said.items()
+            if values
+            for text in (name, *(quote(str(v)) for v in values))
+        ]
+        return " ".join(["jointbench init", *(quote(str(log)) for log in logs), model, "-o case", *options])
+
     @property
     def _verdict(self) -> str:
         """The file of the verdict; empty where none is written."""
@@ -148,7 +162,8 @@ class Diagnose:
             for line in made.assumed:
                 told.print(f"assumed: {line}", markup=False, highlight=False)
             found = _diagnosed(self, case, stage)
-            files = Files(f"--model {quote(str(models[0]))}", self._verdict)
+            model = quote(str(models[0]))
+            files = Files(f"--model {model} --case case", self._verdict, self._draft(logs, model))
             document, written, problem = self._results(found, stage, made.assumed, files)
         self._told(found, document, written, problem, files)
 

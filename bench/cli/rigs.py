@@ -87,7 +87,7 @@ class Simulate:
     configuration: tyro.conf.Positional[Path]
     """Rig, elements and excitation (see docs/configuration.md)."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("record.parquet")
-    """The record to write."""
+    """The record to write: .parquet, which keeps everything, .csv, .npz or .mat."""
     force: bool = False
     """Overwrite a record that exists."""
     seed: int | None = None
@@ -99,7 +99,7 @@ class Simulate:
         """Run the command."""
         import numpy as np
 
-        from bench.record_files import write_recording
+        from bench.record_files.plain_writing import write_record
         from bench.rig import simulate
         from bench.targets import check_targets
 
@@ -107,7 +107,7 @@ class Simulate:
         rig, excitation, seed = _configured(self.configuration)
         rng = np.random.default_rng(seed if self.seed is None else self.seed)
         record = simulate(rig, excitation, rng=rng)
-        write_recording(self.out, record)
+        write_record(self.out, record)
         rows = [
             {
                 "channel": c.name,

@@ -130,6 +130,8 @@ def diagnose(
     # fits run in threads of their own; threads of BLAS within them would only get in each other's way
     with threadpool_limits(1, user_api="blas"):
         found = _diagnose(case, how, rng, anyway)
+        if deadline.skipped:
+            found = replace(found, verdict=found.verdict.in_haste())
         return _by_drives(found, case, how, exclude=exclude, anyway=anyway, rng=rng) or found
 
 
@@ -203,7 +205,6 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     near = _nearest(case, problem, finding, closest, found, rng) if kind == "unknown" else {}
     ranked = (*(Ranked(e.name, e.where, e.probability) for e in seen), *ranking)
     stated, sharp, nominal = problem.noise_stated, not finding.coarse, nominal_estimates(final)
-    hurried = bool(how.deadline.skipped)
     judged = complete(found, sharp=sharp, stated=stated, settings=how.settings.judgement)
     verdict = Verdict(
         verdict=kind,
@@ -232,7 +233,6 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
         settings=changed(how.settings),
         **near,
     )
-    verdict = verdict.in_haste() if hurried else verdict
     return Diagnosis(case, problem, tuple(explanations), verdict, final, where)
 
 

@@ -132,19 +132,10 @@ def diagnose_articulated(
     if not _accurate(problem, found, settings):  # with what is named, long steps tell something else
         found = asked(ArticulatedProblem.of(case, model, case.identification, settings, deadline))
     problem, fits, final, verdict = found.problem, found.fits, found.final, found.verdict
-    verdict = verdict.in_haste() if deadline.skipped else verdict
-    verdict = replace(
-        verdict,
-        warnings=(
-            *far_off(verdict.nominal, settings.judgement.far),
-            *verdict.warnings,
-            *notes,
-            *_of_long_records(told, whole, found),
-            *_followed(problem),
-            *deadline.untried,
-        ),
-        settings=changed(settings),
-    )
+    notes = (*notes, *_of_long_records(told, whole, found), *_followed(problem), *deadline.untried)
+    verdict = replace(verdict.in_haste() if deadline.skipped else verdict, settings=changed(settings))
+    far = far_off(verdict.nominal, settings.judgement.far)
+    verdict = replace(verdict, warnings=(*far, *verdict.warnings, *notes))
     proposal = _next_test(compiled, found)
     if proposal is not None:
         verdict = replace(verdict, next_excitation=proposal.told)

@@ -171,10 +171,12 @@ class Files(NamedTuple):
     Attributes:
         model: Options of `jointbench apply` that name the user's own MJCF; empty where the rig is one of the bench.
         verdict: File of the verdict; empty where none was written.
+        draft: Command that writes the case folder where there is none yet, which `model` names; empty where there is one.
     """
 
     model: str = ""
     verdict: str = ""
+    draft: str = ""
 
     @classmethod
     def of(cls, case: Case, verdict: str = "") -> Files:
@@ -198,6 +200,8 @@ def next_steps(verdict: Verdict, files: Files) -> tuple[NextStep, ...]:
     if verdict.named or verdict.nearest:
         nearest = "" if verdict.named else " --nearest"
         text = "Put it into your model" if verdict.named else "Put what comes nearest into your model"
+        if files.draft:
+            steps.append(NextStep("Keep the case, whose records run in your model:", files.draft))
         if files.model:
             command = f"jointbench apply {file} {files.model} -o corrected.xml{nearest}"
             steps.append(NextStep(f"{text} and run the judging records there{unwritten}:", command))
