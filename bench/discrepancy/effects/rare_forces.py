@@ -183,7 +183,7 @@ RARER: tuple[Effect, ...] = (
             FreeParameter(
                 "stiffness_loss", "stiffness", mean=math.log(0.1), std=1.2, bounds=(-8.0, math.log(0.95))
             ),
-            _resonant_frequency(0.4, 0.7, (0.03, 3.0), 0.15, 1.0),
+            _resonant_frequency(0.4, 0.7, (0.03, 3.0), 0.2, 0.6),
             RESONANT_DAMPING,
         ),
         BASE_FLEXIBILITY.equation,
