@@ -1,7 +1,7 @@
 """Write the cases of a second laboratory, integrated apart from the bench, with small unmodelled physics in each.
 
     python scripts/second_laboratory.py out/second-laboratory
-    python scripts/measured_cases.py --cases out/second-laboratory
+    python scripts/measured_cases.py second_ --cases out/second-laboratory
 
 Of 24 cases, 14 miss one effect of size, four miss two, and in three nothing of size is missing; three miss what no catalogue holds. All
 have a background besides: a hidden resonator, friction along the stroke, a slow swing of the stiffness or some relaxation. Test

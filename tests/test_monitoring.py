@@ -201,7 +201,7 @@ def test_the_command_tells_the_change(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ((), "as in --unit CHANNEL=mm"),
+        ((), "--unit s=… on the command line"),
         (("--unit", "s=N", "F=N"), "--unit s=… says which"),
         (("--unit", "s=mm", "F=N", "--figure"), "--overwrite to replace it"),
     ],

@@ -75,24 +75,16 @@ class Monitor:
         """The record in SI units, with a velocity."""
         import numpy as np
 
-        from bench.errors import ParameterError, RecordingError, UnitError
+        from bench.errors import ParameterError, UnitError
         from bench.record_files import read_recording
 
         pairs = [text.partition("=") for text in self.unit]
         wrong = [name for name, sign, unit in pairs if not (name and sign and unit)]
         if wrong:
             raise ParameterError(f"--unit {wrong[0]} came; CHANNEL=UNIT is expected, as force=kN")
-        try:
-            record = read_recording(
-                self.record, units={name: unit for name, _, unit in pairs}, gaps="interpolate"
-            ).to_si()
-        except RecordingError as error:
-            told = str(error).partition(" has no unit;")
-            raise (
-                ParameterError(f"{told[0]} has no unit; add it, as in --unit CHANNEL=mm")
-                if told[1]
-                else error
-            ) from None
+        record = read_recording(
+            self.record, units={name: unit for name, _, unit in pairs}, gaps="interpolate"
+        ).to_si()
         for name, units in ((self.displacement, ("m", "rad")), (self.force, ("N", "N m"))):
             if record.channel(name).unit not in units:  # named with the channels there are, if missing
                 raise UnitError(

@@ -282,7 +282,6 @@ class Verdict:
 
     def in_haste(self) -> Verdict:
         """The same with no name surer than even: its rivals were never tried, for lack of time."""
-
         return replace(
             self,
             named=tuple(replace(e, probability=min(e.probability, 0.5)) for e in self.named),

@@ -119,7 +119,8 @@ def channels_from(
         base = known.get(name) if known else None
         if name not in units and base is None:
             raise RecordingError(
-                f"channel '{name}' has no unit; add it, as in units={{'{name}': 'N'}} ('1' for a pure number)"
+                f"channel '{name}' has no unit; give it one ('1' for a pure number): units={{'{name}': …}}, or --unit {name}=… on the "
+                "command line"
             )
         entries: dict[str, Any] = {} if base is None else dict(base.__dict__)
         entries |= {"name": name, "unit": units.get(name, entries.get("unit"))}

@@ -20,7 +20,6 @@ from bench.discrepancy.application.friction import FRICTION, harden
 from bench.discrepancy.application.numbers import nominal_parameter, wrong_number
 from bench.discrepancy.application.target import Change, Target
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.model.model_units import in_model_units
 from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import ModelError
 from bench.rig import Element, Rig
@@ -198,7 +197,6 @@ def apply(
         ModelError: The model cannot be read or compiled with the changes.
         UnknownNameError: It lacks what an effect refers to.
     """
-    case = None if case is None else in_model_units(case)[0]
     spec = specification(path)
     own = options or RunOptions()
     if own.step is not None:

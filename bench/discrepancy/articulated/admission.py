@@ -15,11 +15,10 @@ from bench.discrepancy.articulated.against_model import suspicions
 from bench.discrepancy.articulated.against_mujoco import ComparisonSettings, left_out
 from bench.discrepancy.articulated.nominal_values import with_nominal_values
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.case.mjcf_units import expected_units
-from bench.discrepancy.case.unit_conversion import converted
 from bench.discrepancy.checks.load_limits import clipped_case
 from bench.discrepancy.checks.nominal_values import value_notes
 from bench.discrepancy.model.mjcf_file import rig_of
+from bench.discrepancy.model.model_units import in_model_units
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of
 from bench.discrepancy.multibody.inputs import input_of, loads_of
@@ -64,7 +63,7 @@ def admitted_robot(
         UnknownNameError: A channel or parameter names nothing in the model.
     """
     rig = rig_of(declared)
-    case, said = converted(declared, *expected_units(declared, rig))
+    case, said = in_model_units(declared, rig)
     compiled = with_nominal_values(rig, case.parameters)
     case = bound(case, compiled)
     model = ArticulatedModel.of(compiled, case.rig)

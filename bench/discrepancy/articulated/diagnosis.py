@@ -32,12 +32,11 @@ from bench.discrepancy.checks.long_records import after, long_record_notes, thin
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
+from bench.discrepancy.search.load_interpolation import STATED
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
 from bench.discrepancy.verdict import Verdict, far_off
 from bench.errors import UnknownNameError
 
-STATED = "load_interpolation"
-"""Entry of the case that says how inputs are to be read between their samples."""
 HELD = (
     "inputs are read as held from sample to sample, which explains the records without a delay of half a sample; state "
     '"load_interpolation": "zero_order_hold" if they were'

@@ -7,9 +7,6 @@ from typing import NamedTuple
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.case.free_decay import is_free_decay, with_no_load
-from bench.discrepancy.case.mjcf_units import expected_units
-from bench.discrepancy.case.rig_units import in_coherent_units
-from bench.discrepancy.case.unit_conversion import converted
 from bench.discrepancy.checks.counting import counted_from_rest
 from bench.discrepancy.checks.data_quality import refuse_unusable
 from bench.discrepancy.checks.initial_motion import with_starts_found
@@ -21,6 +18,7 @@ from bench.discrepancy.checks.reference import actuators_of, reference_of
 from bench.discrepancy.checks.scales import suspicions
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.mjcf_file import rig_of
+from bench.discrepancy.model.model_units import in_model_units
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 from bench.errors import ModelError, UnitError
@@ -56,11 +54,9 @@ def admitted(declared: Case, *, anyway: bool = False, settings: DiagnosisSetting
     declared = (
         with_no_load(declared) if is_free_decay(declared) and not _driven_by_name(declared) else declared
     )
-    case, said = in_coherent_units(declared)
-    reference = None
-    if own:
-        rig = rig_of(declared)
-        case, said = converted(declared, *expected_units(declared, rig))
+    rig, reference = rig_of(declared) if own else None, None
+    case, said = in_model_units(declared, rig)
+    if rig is not None:
         case, driven = with_accelerations(case, rig, settings=settings.motion)
         case, limited = within_limits(
             case, rig, actuators_of(case, rig, settings=settings.model), settings=settings.model

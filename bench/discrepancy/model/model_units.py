@@ -9,6 +9,7 @@ from bench.discrepancy.case.mjcf_units import expected_units
 from bench.discrepancy.case.rig_units import in_coherent_units
 from bench.discrepancy.case.unit_conversion import conversion_of, converted
 from bench.discrepancy.model.mjcf_file import rig_of
+from bench.rig import Rig
 
 
 class DeclaredUnit(NamedTuple):
@@ -23,11 +24,12 @@ class DeclaredUnit(NamedTuple):
     factor: float
 
 
-def in_model_units(case: Case) -> tuple[Case, tuple[str, ...]]:
+def in_model_units(case: Case, rig: Rig | None = None) -> tuple[Case, tuple[str, ...]]:
     """A case in the units of its model, and what was converted, in words; one that is in them stays as it is.
 
     Args:
         case: As read.
+        rig: Its own MJCF, where it was read before.
 
     Raises:
         UnitError: A declared unit is unknown, or of another dimension than the model says.
@@ -35,7 +37,7 @@ def in_model_units(case: Case) -> tuple[Case, tuple[str, ...]]:
     """
     if not case.rig.endswith(".xml"):
         return in_coherent_units(case)
-    return converted(case, *expected_units(case, rig_of(case)))
+    return converted(case, *expected_units(case, rig or rig_of(case)))
 
 
 def declared_units(case: Case) -> dict[str, DeclaredUnit]:

@@ -182,9 +182,8 @@ class Files(NamedTuple):
     def of(cls, case: Case, verdict: str = "") -> Files:
         """The case's own folder and model."""
         folder = Path(case.folder or ".")
-        own = f"--model {quote(str(folder / case.rig))} --case {quote(str(folder))}"
-        own = own if case.rig.endswith(".xml") else ""
-        return cls(own, verdict)
+        options = f"--model {quote(str(folder / case.rig))} --case {quote(str(folder))}"
+        return cls(options if case.rig.endswith(".xml") else "", verdict)
 
 
 def next_steps(verdict: Verdict, files: Files) -> tuple[NextStep, ...]:
