@@ -593,6 +593,7 @@ def test_numbers_stand_in_the_file_with_what_they_were(tmp_path):
         effect("mass_error", "fore", "elbow", payload=0.5),
         effect("com_error", "upper", "shoulder", shift_x=0.01, shift_y=0.0, shift_z=-0.02),
         effect("position_offset", "elbow", "elbow", offset=0.02, in_loop=1.0),
+        effect("base_tilt", "base", "", tilt_x=0.0, tilt_y=0.1),
     )
     applied = apply(tmp_path / "arm.xml", Findings(found, nominal), linear=False)
     (tmp_path / "sub").mkdir()
@@ -606,6 +607,7 @@ def test_numbers_stand_in_the_file_with_what_they_were(tmp_path):
     assert new.body("fore").ipos[0] == pytest.approx(centre, abs=1e-6)
     assert new.body("upper").ipos - old.body("upper").ipos == pytest.approx([0.01, 0.0, -0.02], abs=1e-6)
     assert new.actuator_biasprm[1, 0] == pytest.approx(-40.0 * 0.02)
+    assert new.opt.gravity == pytest.approx([9.81 * np.sin(0.1), 0.0, -9.81 * np.cos(0.1)], rel=1e-4)
     text = model_text(applied, tmp_path, "arm.xml")
     for words in ("damping 0.3 to 0.36", "+2.00 stated sigmas", "changes the log, not the model"):
         assert words in text

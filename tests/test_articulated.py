@@ -40,13 +40,14 @@ from bench.discrepancy.replay.verification import replay_of
 from bench.discrepancy.report.html_page import write_report
 from bench.discrepancy.report.rerun_recording import write_rerun
 from bench.errors import BenchError
+from bench.rig.gravity import tilted
 
 RATE, FINE, LENGTH = 100.0, 20, 6.0
 """Samples a second, steps a sample of the simulation that stands for the robot, and seconds."""
 NOISE, SPEED_NOISE = 2e-4, 5e-3
 KP = {"shoulder": 60.0, "elbow": 40.0}
 LIMIT, PAYLOAD = 0.4, 0.25
-LINK = """<body name="{body}" pos="0 0 {z}"><joint name="{joint}" type="hinge" axis="0 1 0" damping="{damping}" armature="0.02"
+LINK = """<body name="{body}" pos="0 0 {z}"><joint name="{joint}" type="hinge" axis="{axis}" damping="{damping}" armature="0.02"
   frictionloss="{friction}" solreffriction="0.002 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"/>
   <inertial pos="0 0 -0.12" mass="{mass}" diaginertia="0.004 0.004 0.0006"/>{child}
   <site name="{body}_tip" pos="0 0 -0.25"/></body>"""
@@ -56,13 +57,22 @@ LOAD = (
 )
 
 
-def mjcf(*, servo, friction=0.0, payload=0.0):
+def mjcf(*, servo, friction=0.0, payload=0.0, shoulder="0 1 0", gravity="0 0 -9.81"):
     """A hanging two-link arm."""
     load = "" if not payload else LOAD.format(payload)
     fore = LINK.format(
-        body="fore", joint="elbow", z=-0.25, damping=0.1, friction=friction, mass=0.5, child=load
+        body="fore",
+        joint="elbow",
+        z=-0.25,
+        axis="0 1 0",
+        damping=0.1,
+        friction=friction,
+        mass=0.5,
+        child=load,
     )
-    arm = LINK.format(body="upper", joint="shoulder", z=0.0, damping=0.2, friction=0.0, mass=1.0, child=fore)
+    arm = LINK.format(
+        body="upper", joint="shoulder", z=0.0, axis=shoulder, damping=0.2, friction=0.0, mass=1.0, child=fore
+    )
     drives = "".join(
         f'<position name="{j}_drive" joint="{j}" kp="{kp}"/>'
         if servo
@@ -70,7 +80,7 @@ def mjcf(*, servo, friction=0.0, payload=0.0):
         for j, kp in KP.items()
     )
     return (
-        f'<mujoco><option gravity="0 0 -9.81" timestep="{1.0 / RATE / FINE}" integrator="RK4"/>'
+        f'<mujoco><option gravity="{gravity}" timestep="{1.0 / RATE / FINE}" integrator="RK4"/>'
         f"<worldbody>{arm}</worldbody><actuator>{drives}</actuator></mujoco>"
     )
 
@@ -164,6 +174,20 @@ def test_what_was_left_out_is_named_at_its_place(tmp_path, name):
     write_report(found, tmp_path / "report.html")
     write_rerun(found, tmp_path / "run.rrd")
     assert wanted[0] in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.slow
+def test_a_base_that_leans_is_named_by_its_angles_and_gravity_turned_in_the_model(tmp_path):
+    across = "1 0 0"  # two parallel axes could not tell a lean about them from a zero of the shoulder
+    pull = tilted(np.array([0.0, 0.0, -9.81]), 0.12, -0.08)
+    truth = mjcf(servo=True, shoulder=across, gravity=" ".join(str(x) for x in pull))
+    folder = write_case(tmp_path, truth, servo=True, nominal=mjcf(servo=True, shoulder=across))
+    verdict = diagnose(read_case(folder)).verdict
+    assert [(e.name, e.where) for e in verdict.named] == [("base_tilt", "base")]
+    found = {name: e.value for name, e in verdict.named[0].parameters.items()}
+    assert found == pytest.approx({"tilt_x": 0.12, "tilt_y": -0.08}, rel=0.05)
+    corrected = apply(folder / "model.xml", Findings(verdict.named), linear=False)
+    assert corrected.compiled().opt.gravity == pytest.approx(pull, abs=0.06)
 
 
 @pytest.mark.slow

@@ -12,12 +12,13 @@ from test_articulated import mjcf, write_case
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import Findings, apply
 from bench.discrepancy.case.case import Case, NominalParameter
-from bench.discrepancy.multibody.body_terms import body_terms
+from bench.discrepancy.multibody.body_terms import body_terms, gravity_terms
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.replay.verification import verify
 from bench.errors import BenchError, ModelError
 from bench.native.inverse import along
 from bench.rig.bodies import BODIES, body_value, moved_by, set_body
+from bench.rig.gravity import level_axes, tilted
 
 HEAVIER, FARTHER = 1.5, 0.02
 
@@ -178,6 +179,34 @@ def test_torques_along_a_motion_are_those_of_inverse_dynamics(option, joint, bod
         whole = np.zeros((2, 2))
         mujoco.mj_fullM(model, data, whole)
         np.testing.assert_allclose(inertia[k], np.diag(whole), rtol=1e-11)
+
+
+def test_a_base_that_leans_turns_gravity_the_other_way_about_horizontal_axes():
+    down = np.array([0.0, 0.0, -9.81])
+    assert tilted(down, 0.0, 0.3) == pytest.approx([9.81 * np.sin(0.3), 0.0, -9.81 * np.cos(0.3)])
+    assert tilted(down, 0.2, 0.0) == pytest.approx([0.0, -9.81 * np.sin(0.2), -9.81 * np.cos(0.2)])
+    for gravity in (down, np.array([0.0, -9.81, 0.0]), np.array([-3.0, 1.0, 2.0])):
+        first, second = level_axes(gravity)
+        up = -gravity / np.linalg.norm(gravity)
+        assert np.stack([first, second, up]) @ np.stack([first, second, up]).T == pytest.approx(np.eye(3))
+        assert np.cross(first, second) == pytest.approx(up)
+        assert np.linalg.norm(tilted(gravity, 0.4, -0.1)) == pytest.approx(np.linalg.norm(gravity))
+
+
+def test_what_a_lean_of_the_base_changes_is_exact_however_large_it_is():
+    model = ArticulatedModel.of(mujoco.MjModel.from_xml_string(SWINGING.format(option="", joint="", body="")))
+    rng = np.random.default_rng(4)
+    motion = tuple(rng.normal(size=(3, 20, 2)))
+    base = model.dynamics(*motion)
+
+    def beside(changed):
+        difference = (changed.torque - base.torque).T
+        return np.stack([difference, np.zeros_like(difference)], axis=1)
+
+    terms = gravity_terms(model, motion, beside)
+    leaning = model.with_tilt(0.7, -0.4).dynamics(*motion).torque - base.torque
+    for j in range(2):
+        np.testing.assert_allclose(terms.of_joint(j).change(0.7, -0.4), leaning[:, j], atol=1e-9)
 
 
 def test_what_a_joint_moves_of_its_own_body_is_its_entry_of_the_mass_matrix():

@@ -50,6 +50,7 @@ LOOKS = {
     "degrading_hysteresis": "Loops that lose strength or stiffness from cycle to cycle.",
     "pinching_hysteresis": "Loops with a waist: soft near the middle, stiff at the ends.",
     "mass_error": "Inertial forces are off in proportion to the acceleration; on an arm, gravity besides.",
+    "base_tilt": "Gravity torques of all joints are off, as if gravity pulled another way.",
     "com_error": "Gravity torques are off by a part that turns with the posture; little else.",
     "gravity_compensation": "On an arm, gravity sags less, or more, than the mass tells; inertia is right.",
     "stiffness_error": "All resonances are off in proportion, at every amplitude.",

@@ -34,6 +34,10 @@ TRAIN = {Slot.TRAIN: 1.0, Slot.MOTOR: MOTOR, Slot.TRAIN_DAMPING: 0.05}
 SERVOS: dict[str, dict[Slot, float]] = {
     "actuator_deadband": {Slot.DEADBAND: 0.1},
     "armature_error": {Slot.INERTIA: 0.06},
+    "base_tilt": {
+        Slot.OFFSET: -0.6,
+        Slot.STIFFNESS: 0.4,
+    },  # gravity pulls another way, and another with the posture
     "backlash": {**TRAIN, Slot.TRAIN_STIFFNESS: 200.0, Slot.CLEARANCE: 0.1},
     "com_error": {Slot.STIFFNESS: 1.5},  # a centre of mass aside turns its torque with the posture
     "gravity_compensation": {Slot.OFFSET: 1.4},

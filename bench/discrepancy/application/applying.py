@@ -27,7 +27,7 @@ from bench.rig.building import parse
 from bench.rig.held_joints import held, weld
 from bench.rig.mjcf_files import mjcf_text
 
-WRONG_NUMBERS = ("mass_error", "com_error", "stiffness_error", "damping_error")
+WRONG_NUMBERS = ("mass_error", "com_error", "base_tilt", "stiffness_error", "damping_error")
 INTEGRATORS = {
     mujoco.mjtIntegrator.mjINT_EULER: "Euler",
     mujoco.mjtIntegrator.mjINT_RK4: "RK4",

@@ -16,6 +16,7 @@ from bench.discrepancy.verdict import NamedEffect, NominalEstimate
 from bench.errors import UnknownNameError
 from bench.rig.actuators import DRIVES, write_drive
 from bench.rig.bodies import AXES, BODIES, scaled_inertia
+from bench.rig.gravity import tilted
 
 
 def nominal_parameter(target: Target, estimate: NominalEstimate) -> Change:
@@ -69,7 +70,7 @@ def _only_body(target: Target) -> str:
 
 
 def wrong_number(target: Target, effect: NamedEffect, nominal: Collection[str]) -> Change:
-    """An error of a mass, a stiffness or a damping that a verdict names.
+    """An error of a mass, a stiffness, a damping or the direction of gravity that a verdict names.
 
     Of a linear structure it is an error of the nominal parameter in `channel`, and the estimate of that holds it already.
     """
@@ -78,6 +79,8 @@ def wrong_number(target: Target, effect: NamedEffect, nominal: Collection[str]) 
         return _inertial(target, effect)
     if "added" in v:
         return damping_error(target, effect)
+    if "tilt_x" in v:
+        return _base_tilt(target, effect)
     label = effect.channel or effect.where
     if label in nominal:
         return Change(
@@ -127,6 +130,16 @@ def _inertial(target: Target, effect: NamedEffect) -> Change:
     body.ipos, body.iquat = model.model.body_ipos[i], model.model.body_iquat[i]
     body.inertia = model.model.body_inertia[i]
     return Change(effect.name, name, "native", text, (("body", name),))
+
+
+def _base_tilt(target: Target, effect: NamedEffect) -> Change:
+    """A base that leans: the vector of gravity in its frame."""
+    v = values_of(effect)
+    before = np.array(target.spec.option.gravity)
+    after = tilted(before, v["tilt_x"], v["tilt_y"])
+    target.spec.option.gravity = after
+    text = f"gravity {_point(before)} -> {_point(after)} m/s^2 in the frame of the base"
+    return Change(effect.name, effect.where, "native", text)
 
 
 def _point(row: np.ndarray) -> str:

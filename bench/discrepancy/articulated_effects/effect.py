@@ -1,8 +1,8 @@
 """An effect of articulated models: where it may sit, its parameters, and how it enters the runs of a joint.
 
-An effect at a joint or a drive sets entries of the parameter vector of that joint's runs (`joint_forces.Slot`); one of a body changes the
-torque of the inverse dynamics of all joints; one of an encoder corrects the log. Parameters are of order one, as in the catalogue of
-linear structures (`bench.discrepancy.effects.effect`), with the scales of the joint's own records.
+An effect at a joint or a drive sets entries of the parameter vector of that joint's runs (`joint_forces.Slot`); one of a body or the base
+changes the torque of the inverse dynamics of all joints; one of an encoder corrects the log. Parameters are of order one, as in the
+catalogue of linear structures (`bench.discrepancy.effects.effect`), with the scales of the joint's own records.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from bench.discrepancy.articulated_effects.slot_setters import SlotValues, train
 from bench.discrepancy.effects.effect import FreeParameter
 from bench.discrepancy.multibody.encoders import Encoder
 
-JointSite = Literal["joint", "pair", "body", "end", "actuator", "sensor"]
+JointSite = Literal["joint", "pair", "body", "base", "end", "actuator", "sensor"]
 
 NUMBERS = frozenset({
     "mass_error", "com_error", "armature_error", "damping_error", "force_gain_error", "servo_gain_error", "position_gain_error",
-    "force_offset", "position_offset",
+    "force_offset", "position_offset", "base_tilt",
 })  # fmt: skip
 """Effects that are a wrong number."""
 

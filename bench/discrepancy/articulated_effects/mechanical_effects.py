@@ -252,5 +252,15 @@ MECHANICAL_EFFECTS: tuple[ArticulatedEffect, ...] = (
         (FreeParameter("share", signed=True, mean=0.0, std=0.5, bounds=(-2.0, 2.0), unit="1"),),
         "a part of the body's weight is carried otherwise: by a counterbalance, or by the controller",
     ),
+    ArticulatedEffect(
+        "base_tilt",
+        "inertia",
+        "base",
+        tuple(
+            FreeParameter(f"tilt_{axis}", signed=True, mean=0.0, std=0.1, bounds=(-1.5, 1.5), unit="rad")
+            for axis in "xy"
+        ),
+        "the base leans: gravity turned in its frame",
+    ),
 )
 """Effects at joints and bodies."""

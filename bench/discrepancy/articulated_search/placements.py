@@ -9,12 +9,14 @@ from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.ends import ends_within
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 
+BASE = "base"
+"""Name of the place on which the model stands."""
 AND = "+"
 """Between the names of two joints that share an effect."""
 
 
 def placements(problem: ArticulatedProblem, catalogue: Sequence[ArticulatedEffect]) -> list[PlacedOnJoint]:
-    """Every effect at every place where it may sit: joints, neighbours, bodies, ends of the tree, drives, encoders."""
+    """Every effect at every place where it may sit: joints, neighbours, bodies, the base, ends of the tree, drives, encoders."""
     out = list[PlacedOnJoint]()
     at_ends = [effect for effect in catalogue if effect.site == "end"]
     for j in range(len(problem.joints)):
@@ -44,6 +46,8 @@ def _at(
             PlacedOnJoint(effect, f"{joint.name}{AND}{problem.joints[i].name}", j, scales, (i,))
             for i in later
         ]
+    if effect.site == "base":
+        return [PlacedOnJoint(effect, BASE, j, scales)] if j == 0 and problem.model.gravity.any() else []
     names = {"joint": joint.name, "sensor": joint.name, "actuator": drive.name, "body": joint.body}
     return [PlacedOnJoint(effect, names[effect.site], j, scales)]
 

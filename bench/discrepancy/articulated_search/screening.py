@@ -159,8 +159,8 @@ def grid(placed: PlacedOnJoint, *, servo: bool, sides: Sequence[float]) -> list[
     effect = placed.effect
     if effect.name == "cogging":
         return [np.array([s, c, n]) for n in effect.parameters[2].grid for s, c in ((0.03, 0.0), (0.0, 0.03))]
-    if effect.name == "com_error":
-        return [0.03 * axis for axis in np.eye(3)]
+    if effect.name in ("com_error", "base_tilt"):
+        return [0.03 * axis for axis in np.eye(len(effect.parameters))]
     axes = []
     for k, p in enumerate(effect.parameters):
         default = 0.1 * p.std if p.signed and k == 0 else p.mean

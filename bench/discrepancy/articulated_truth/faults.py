@@ -103,6 +103,11 @@ def _sign(rng: np.random.Generator) -> float:
     return 1.0 if rng.random() < 0.5 else -1.0
 
 
+def _tilt(s: float, rng: np.random.Generator) -> dict[str, float]:
+    angle, way = 0.05 + 0.3 * s, rng.uniform(0.0, 2.0 * np.pi)
+    return {"tilt_x": angle * float(np.cos(way)), "tilt_y": angle * float(np.sin(way))}
+
+
 def _stop(z: Sizes, s: float, rng: np.random.Generator) -> dict[str, float]:
     side = _sign(rng)
     return {
@@ -185,7 +190,7 @@ FAULTS = (
         lambda z, s, rng: {"limit": 2.0 * s * z.torque, "part": 0.9, "periods": float(rng.integers(3, 7))},
         {"limit": Cell.FRICTION, "part": Cell.WAVINESS, "periods": Cell.WAVES}, foreign=True,
     ),
-    Fault("base_tilt", "base", lambda z, s, rng: {"angle": _sign(rng) * (0.05 + 0.3 * s)}, {}, foreign=True, joints=3),
+    Fault("base_tilt", "base", lambda z, s, rng: _tilt(s, rng), {}, joints=3),
     Fault(
         "coupling_spring", "joint", lambda z, s, rng: {"stiffness": 3.0 * s * z.torque / z.reach},
         {"stiffness": Cell.TIE}, foreign=True, joints=3,
@@ -239,7 +244,7 @@ def with_faults(robot: Robot, withheld: tuple[Withheld, ...]) -> Faulty:
         if one.fault.name == "coupling_spring":
             table[j, Cell.TIED_TO] = (j + 2) % len(table)
         elif one.fault.name == "base_tilt":
-            bodies = bodies.with_gravity_turned(np.array([values["angle"], 0.6 * values["angle"], 0.0]))
+            bodies = bodies.with_tilt(values["tilt_x"], values["tilt_y"])
         elif one.fault.name == "mass_error":
             bodies = bodies.with_payload(one.where, values["part"] * robot.nominal.mass(one.where))
         elif one.fault.name == "com_error":

@@ -1,4 +1,4 @@
-"""What the numbers of a body change in the equations of the joints: mass, moment of inertia, centre of mass.
+"""What the numbers of a body change in the equations of the joints: mass, moment of inertia, centre of mass; and what gravity does.
 
 A body is a point mass m at its centre c and an inertia about it. Of the point, torques and inertias along a given motion are a quadratic
 polynomial of where it lies; of the inertia they are linear. So along that motion
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from bench.arrays import Array
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.multibody.model import ArticulatedModel, Dynamics
 from bench.rig.bodies import AXES, BODIES
+from bench.rig.gravity import tilted
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,34 @@ class BodyTerms:
         if by.get("inertia"):
             out = out + by["inertia"] * self.moment
         return out
+
+
+class GravityTerms(NamedTuple):
+    """What the direction of gravity changes in the equation of a joint.
+
+    Attributes:
+        vector: (3,) as the model has it [m/s^2].
+        terms: (3, …, n_steps) bias by a unit of it along each axis of the model.
+    """
+
+    vector: Array
+    terms: Array
+
+    def of_joint(self, j: int) -> GravityTerms:
+        """The terms of joint `j`."""
+        return GravityTerms(self.vector, np.ascontiguousarray(self.terms[:, j]))
+
+    def change(self, x: float, y: float) -> Array:
+        """Change (n_steps,) of the bias on a base that leans, see `tilted`."""
+        return (tilted(self.vector, x, y) - self.vector) @ self.terms
+
+
+def gravity_terms(
+    model: ArticulatedModel, motion: tuple[Array, Array, Array], beside: Callable[[Dynamics], Array]
+) -> GravityTerms:
+    """The terms (3, n_joints, n_steps) of gravity along a motion, `beside` as for `body_terms`."""
+    pulled = [beside(model.with_gravity(model.gravity + axis).dynamics(*motion))[:, 0] for axis in np.eye(3)]
+    return GravityTerms(model.gravity, np.stack(pulled))
 
 
 def body_terms(

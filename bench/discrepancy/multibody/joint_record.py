@@ -17,7 +17,7 @@ from scipy.linalg import expm, solve_discrete_are
 
 from bench.arrays import Array
 from bench.discrepancy.multibody.body_numbers import BodyNumbers
-from bench.discrepancy.multibody.body_terms import BodyTerms
+from bench.discrepancy.multibody.body_terms import BodyTerms, GravityTerms
 from bench.discrepancy.multibody.encoders import TRUE, Encoder
 from bench.discrepancy.multibody.joints import Joint
 
@@ -77,6 +77,7 @@ class JointRecord:
         payloads: Body to the changes of bias and inertia (2, n_steps) by a kilogram at its tip.
         centres: The same (3, 2, n_steps) for a metre of its centre of mass along each axis.
         weights: Body to the change of bias (n_steps,) by its weight.
+        gravity: What the direction of gravity changes.
         beside: Neighbour in the tree to its velocity (n_steps,).
         touches: End of the tree to its lowest point (3, n_steps): its height, by how much the joint raises it, and how fast the others do.
         sample: Time between samples [s].
@@ -105,6 +106,7 @@ class JointRecord:
     payloads: Mapping[str, Array]
     centres: Mapping[str, Array]
     weights: Mapping[str, Array]
+    gravity: GravityTerms
     beside: Mapping[str, Array]
     touches: Mapping[str, Array]
     sample: float
@@ -169,11 +171,13 @@ class JointRecord:
         return np.abs(bias + (inertia - self.joint.armature) * self.acceleration)
 
     def _left_out(self, body: str, values: Mapping[str, float]) -> Array:
-        """Changes of bias and inertia (2, n_steps) by what the model leaves out at a body."""
+        """Changes of bias and inertia (2, n_steps) by what the model leaves out at a body, or at the base."""
         if "payload" in values:
             return self.payloads[body] * values["payload"]
         if "share" in values:
             return np.stack([-values["share"] * self.weights[body], np.zeros_like(self.bias)])
+        if "tilt_x" in values:
+            return np.stack([self.gravity.change(*values.values()), np.zeros_like(self.bias)])
         return np.asarray(np.tensordot(np.array(list(values.values())), self.centres[body], axes=1))
 
     @property

@@ -22,6 +22,7 @@ from bench.errors import ModelError, UnknownNameError
 from bench.native.inverse import along
 from bench.rig import Rig
 from bench.rig.bodies import body_value, set_body, without_shortcuts
+from bench.rig.gravity import tilted
 from bench.rig.held_joints import MOTION
 
 
@@ -165,17 +166,20 @@ class ArticulatedModel:
         out.model.body_ipos[body_index(out.model, body)] += shift
         return out
 
-    def with_gravity_turned(self, turn: Array) -> ArticulatedModel:
-        """The model on a base tilted by the rotation vector `turn` (3,) [rad]."""
+    @property
+    def gravity(self) -> Array:
+        """Vector of gravity (3,) [m/s^2]."""
+        return np.array(self.model.opt.gravity)
+
+    def with_gravity(self, gravity: Array) -> ArticulatedModel:
+        """The model with another vector of gravity (3,) [m/s^2]."""
         out = self._copied()
-        quaternion = np.zeros(4)
-        angle = float(np.linalg.norm(turn))
-        axis = turn / angle if angle > 0 else np.array([1.0, 0.0, 0.0])
-        mujoco.mju_axisAngle2Quat(quaternion, axis, -angle)
-        gravity = np.zeros(3)
-        mujoco.mju_rotVecQuat(gravity, np.array(out.model.opt.gravity), quaternion)
         out.model.opt.gravity[:] = gravity
         return out
+
+    def with_tilt(self, x: float, y: float) -> ArticulatedModel:
+        """The model on a base that leans by a rotation about two horizontal axes [rad], see `tilted`."""
+        return self.with_gravity(tilted(self.gravity, x, y))
 
     def _copied(self) -> ArticulatedModel:
         return replace(self, model=copy.copy(self.model))

@@ -16,7 +16,7 @@ from scipy.signal import butter, sosfiltfilt
 from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.body_numbers import BodyNumbers
-from bench.discrepancy.multibody.body_terms import body_terms
+from bench.discrepancy.multibody.body_terms import body_terms, gravity_terms
 from bench.discrepancy.multibody.encoders import TRUE, Encoder, encoders_of, weights_of
 from bench.discrepancy.multibody.inputs import input_of, load_on, noise_of_loads
 from bench.discrepancy.multibody.joint_record import JointRecord
@@ -75,6 +75,7 @@ def prepare(
         for body in model.bodies
     }
     weights = {body: clock.between(model.weight(body, motion.position)) for body in model.bodies}
+    gravity = gravity_terms(model, moved, beside)
     slope, speeds = clock.between(model.slopes(*moved)), clock.between(motion.velocity)
     process = torque_noise(model, motion, clock, record.step)
     touches = touches_along(model, motion, clock)
@@ -90,7 +91,7 @@ def prepare(
             encoders_of(case, joint).channels[0].side, float(np.hypot(stated, process[j])),
             {b: terms.of_joint(j) for b, terms in bodies.items()}, {b: c[j] for b, c in payloads.items()},
             {b: np.ascontiguousarray(c[:, j]) for b, c in centres.items()}, {b: c[j] for b, c in weights.items()},
-            beside_of(model, j, speeds), touches[j], record.step, np.ones((len(record), len(motion.noise[j]))),
+            gravity.of_joint(j), beside_of(model, j, speeds), touches[j], record.step, np.ones((len(record), len(motion.noise[j]))),
         )  # fmt: skip
         joints.append(replace(raw, weight=weights_of(case, record, joint, raw.innovation)))
     return PreparedRecord(record, motion, tuple(joints))

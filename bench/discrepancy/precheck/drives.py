@@ -30,10 +30,6 @@ class DrivesSettings:
     latest: float = 0.025
     """Delay [s] up to which it is a drive's own: the frame of 20 ms of an RC servo's pulses, the slowest command that is in use, and a
     quarter of it for what computes."""
-    samples: float = 1.5
-    """Samples up to which a shift may be one of the clock of the record: its step, and half of one of the input that is held over it."""
-    certain: float = 5.0
-    """Standard errors from which a shift is told."""
     sigmas: float = 2.0
     """Stated standard deviations of the damping that may make a servo lag otherwise than its model: 95 %."""
     alike: float = 0.5
@@ -98,26 +94,26 @@ def _of_clocks(
     assert joint.drive is not None
     held = 0.5 * record.step if own.load_interpolation == "zero_order_hold" else 0.0
     late = -found.lag - held - joint.drive.delay  # the joint after the target, beyond what the model says
-    least = SETTINGS.certain * found.lag_std
+    least = found.least(record.step)
     hold = joint.drive.stiffness or abs(joint.drive.gear) * joint.drive.kp
     # a servo lags by its damping over its gain, and by the delay that its model states
     overstated = joint.damping / hold + joint.drive.delay
     stated = [p.std for p in own.parameters if p.name in (f"damping:{joint.name}", f"kv:{joint.drive.name}")]
     unsure = SETTINGS.sigmas * float(np.hypot.reduce(stated or [0.0])) / hold
-    if abs(found.drift) > max(SETTINGS.samples * record.step, SETTINGS.certain * found.drift_std):
+    if found.left > settings.shift:
+        return  # a wrong law lags as well, and otherwise where the motion is another, but no shift takes it away
+    if found.drifts(record.step):
         yield (
             f"the lag between '{channel}' and '{position}' changes by {1e3 * found.drift:.3g} ms along '{record.name}': their clocks drift "
             "apart; resample one of them"
         )
         return
-    if found.left > settings.shift:
-        return  # a wrong law lags as well, but no shift takes it away
-    if late > max(SETTINGS.latest + unsure, SETTINGS.samples * record.step, least):
+    if late > max(SETTINGS.latest + unsure, least):
         yield (
             f"'{position}' answers '{channel}' {1e3 * late:.3g} ms later than the model does in '{record.name}', more than a drive's own "
             "delay: look whether one clock logged the two, else the diagnosis takes it for a delay or for damping"
         )
-    elif -late > max(SETTINGS.samples * record.step + overstated, least):
+    elif -late > least + overstated:
         yield (
             f"'{position}' answers '{channel}' {-1e3 * late:.3g} ms before the model does in '{record.name}': their clocks differ; "
             "align them"

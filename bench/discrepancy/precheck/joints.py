@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from bench.arrays import Array
 from bench.discrepancy.articulated.admission import admitted_robot
@@ -17,6 +18,7 @@ from bench.discrepancy.multibody.encoders import encoders_of
 from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.precheck.positions import position_doubts
+from bench.discrepancy.precheck.timing import timing
 from bench.errors import BenchError, RecordingError
 
 
@@ -137,6 +139,9 @@ def _derivatives(
         yield f"'{position}' and '{velocity}' have opposite signs in '{record.name}'; turn one of them round"
     if not 0.5 < pair.factor < 2.0:
         yield f"'{position}' is {pair.factor:.3g} times what '{velocity}' says in '{record.name}': look at their units"
-    if abs(pair.lag) > 1.5 * record.step:
-        late, early = (position, velocity) if pair.lag > 0.0 else (velocity, position)
-        yield f"'{late}' lags '{early}' by {1e3 * abs(pair.lag):.3g} ms in '{record.name}'; align them"
+    # an integral runs off by the zero of the velocity, which a slope takes up
+    turned = cumulative_trapezoid(np.sign(pair.correlation) * v, dx=record.step, initial=0.0)
+    shift = timing(q, turned, record.step, np.linspace(-1.0, 1.0, len(q))[:, None])
+    if shift is not None and abs(shift.lag) > shift.least(record.step):
+        late, early = (position, velocity) if shift.lag > 0.0 else (velocity, position)
+        yield f"'{late}' lags '{early}' by {1e3 * abs(shift.lag):.3g} ms in '{record.name}'; align them"

@@ -24,6 +24,10 @@ class TimingSettings:
     """Change of the shift, in samples, at which they end: far below the part of a sample from which a shift counts."""
     reach: float = 0.25
     """Part of the record up to which a shift is looked for."""
+    samples: float = 1.5
+    """Samples up to which a shift may be one of the clock of the record: its step, and half of one of an input that is held over it."""
+    certain: float = 5.0
+    """Standard errors from which a shift is told."""
 
 
 SETTINGS = TimingSettings()
@@ -44,6 +48,14 @@ class Timing(NamedTuple):
     lag_std: float
     drift_std: float
     left: float
+
+    def least(self, step: float) -> float:
+        """Lag [s] from which one counts, samples taken every `step` seconds."""
+        return max(SETTINGS.samples * step, SETTINGS.certain * self.lag_std)
+
+    def drifts(self, step: float) -> bool:
+        """Whether the shift grows along the record."""
+        return abs(self.drift) > max(SETTINGS.samples * step, SETTINGS.certain * self.drift_std)
 
 
 def timing(first: Array, second: Array, step: float, beside: Array) -> Timing | None:
