@@ -131,6 +131,44 @@ def test_friction_that_follows_a_channel_is_named_with_its_sensitivity():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("changes", ["stiffness", "damping"])
+def test_a_spring_or_a_damper_that_follows_a_channel_is_named_with_what_a_deviation_of_it_does(changes):
+    """Oil that warms: the nominal numbers hold at the mean of the tests; the temperature of the judging record is another."""
+    rng = np.random.default_rng(8)
+    t = np.arange(3000) / RATE
+    records, warm = [], []
+    for i, (start, end) in enumerate(((20.0, 32.0), (30.0, 45.0), (25.0, 40.0))):
+        q = 5.0 * np.sin(2 * np.pi * (0.8 + 0.3 * i) * t) + 2.0 * np.sin(2 * np.pi * 2.1 * t + i)
+        v = np.gradient(q, t)
+        temperature = np.linspace(start, end, len(t))
+        less = 1.0 - 0.02 * (temperature - 32.0)
+        k, c = (1.5 * less, 0.2) if changes == "stiffness" else (1.5, 0.2 * less)
+        force = k * q + c * v + rng.normal(0.0, 0.05, len(t))
+        values = {"displacement": q, "force": force, "oil": temperature}
+        records.append(record_from_arrays("validation" if i == 2 else f"identification_{i}", t, values))
+        warm.append(temperature)
+    channels = (
+        CaseChannel("displacement", "mm", "prescribed", 1e-6),
+        CaseChannel("force", "N", "response", 0.05),
+        CaseChannel("oil", "degC", "scheduling"),
+    )
+    parameters = (
+        NominalParameter("stiffness", 1.5, 0.05, "N/mm"),
+        NominalParameter("damping", 0.2, 0.02, "N s/mm"),
+    )
+    case = Case("damper", "damper", parameters, channels, tuple(records[:2]), (records[2],))
+    verdict = diagnose(case).verdict
+    (named,) = verdict.named
+    assert (named.name, named.channel) == (f"scheduled_{changes}", "oil")
+    own = {"stiffness": 1.5, "damping": 0.2}[changes]
+    deviation = float(np.std(np.concatenate(warm[:2])))
+    assert named.parameters["deviation"].value == pytest.approx(deviation)
+    assert named.parameters[f"{changes}_change"].value == pytest.approx(-0.02 * own * deviation, rel=0.05)
+    assert verdict.complete
+    assert verdict.gap.after < 1.1 * verdict.gap.noise_floor
+
+
+@pytest.mark.slow
 def test_friction_that_differs_from_record_to_record_is_named_as_that():
     diagnosis = diagnose(component((70.0, 100.0, 130.0, 160.0), tension=False))
     first = diagnosis.explanations[0].hypothesis

@@ -38,6 +38,8 @@ LOOKS = {
     "record_dependent_friction": "Friction of a different height in each record, steady within each.",
     "record_dependent_stiffness": "The frequency differs from record to record, and is steady within each.",
     "record_dependent_damping": "The height of peaks differs from record to record, their frequency does not.",
+    "scheduled_stiffness": "The frequency follows the scheduling channel.",
+    "scheduled_damping": "The height of peaks follows the scheduling channel, their frequency does not.",
     "stiffness_drift": "The frequency changes along the record; begun anew it is as before or has stayed.",
     "force_offset": "A constant force: the rest position is off, the motion about it is right.",
     "timed_force": "A force that is switched on and off by a clock and not by the motion.",
@@ -119,7 +121,7 @@ def _range(parameter: FreeParameter) -> str:
     """Where the prior expects a parameter, as multiples of its scale."""
     if parameter.fixed:
         return "tried: " + (
-            f"{len(parameter.grid)} values"
+            f"{len(parameter.grid)} values from {min(parameter.grid):g} to {max(parameter.grid):g}"
             if len(parameter.grid) > 4
             else ", ".join(f"{g:g}" for g in parameter.grid)
         )

@@ -224,7 +224,7 @@ OF_A_RECORD = {
     "timed_force": "its windows are those of the first record, others have their own",
     "harmonic_force": "its phase is that of the first record, others have their own",
     "record_dependent_": "its size is the mean of that in the records",
-    "scheduled_": "it stands in the model at the reference s0 alone; to follow the channel is left to your loop",
+    "scheduled_": "it stands in the model at the reference s0, or the mean, alone; to follow the channel is left to your loop",
 }
 """What of an effect the corrected model does not hold, since it is a record's own or follows a channel, by the beginning of its name."""
 
@@ -263,6 +263,12 @@ def element(target: Target, effect: NamedEffect) -> Change:
     )  # fmt: skip
 
 
+def follows_channel(target: Target, effect: NamedEffect) -> Change:
+    """A stiffness or damping that follows a channel about its mean, where the nominal parameter is what it is."""
+    text = "the nominal parameter is its mean over the records; to follow the channel is left to your loop"
+    return Change(effect.name, target.named(effect.where), "none", text)
+
+
 FORCES: dict[str, Callable[[Target, NamedEffect], Change]] = {
     "cubic_stiffness": _polynomial("stiffness", 2),
     "quadratic_stiffness": _polynomial("stiffness", 1),
@@ -276,5 +282,7 @@ FORCES: dict[str, Callable[[Target, NamedEffect], Change]] = {
     "one_sided_stop": one_sided_stop,
     "joint_compliance": elastic_train,
     "backlash": elastic_train,
+    "scheduled_stiffness": follows_channel,
+    "scheduled_damping": follows_channel,
 }
 """Effects at a joint that have a form other than a law; those that are a wrong number are told apart in `numbers`."""

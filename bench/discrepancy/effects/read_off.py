@@ -89,6 +89,13 @@ def read_off(forces: Iterable[Effect]) -> tuple[Effect, ...]:
         )
         for effect in forces if schedulable(effect)
     )  # fmt: skip
+    following = (
+        replace(
+            effect, name=FOLLOWED + effect.name, varies=effect.name, site="read off",
+            equation=f"(s - s_mean)/s_std f, s a channel; {effect.equation}", log_prior=0.5 * EFFECT_SETTINGS.rare, law=None, theta=None,
+        )
+        for effect in CHANGES
+    )  # fmt: skip
     differing = (
         replace(
             effect, name=differing_name(effect), varies=effect.name, site="read off", equation=f"c_i f in record i; {effect.equation}",
@@ -128,4 +135,5 @@ def read_off(forces: Iterable[Effect]) -> tuple[Effect, ...]:
         ),
         *differing,
         *scheduled,
+        *following,
     )

@@ -99,7 +99,7 @@ def encoders_of(case: Case, joint: Joint) -> Encoders:
     if 0 not in found:
         raise FileFormatError(
             f'nothing measures the position of joint \'{joint.name}\'; give a channel "joint": "{joint.name}", '
-            '"quantity": "position", or weld the joint where it was held'
+            '"quantity": "position", or say by "joints" that it was held'
         )
     channels = tuple(found[order] for order in sorted(found))
     noise = np.array([noise_of(channel) for channel in channels])

@@ -20,7 +20,8 @@ def input_of(case: Case, joint: Joint) -> CaseChannel:
         if joint.drive is not None and channel.target == f"actuator:{joint.drive.name}":
             return channel
     raise FileFormatError(
-        f"no channel drives joint '{joint.name}'; name its command or torque by \"actuator\", or weld the joint where it was held"
+        f"no channel drives joint '{joint.name}'; name its command or torque by \"actuator\", or say by "
+        f'"joints": {{"{joint.name}": "follow"}} that it moves as measured, or "hold" that it was held'
     )
 
 

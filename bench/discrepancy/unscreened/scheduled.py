@@ -5,8 +5,9 @@ A channel of the role "scheduling" is no load and no response; it tells a condit
     f(t) = (1 - kappa + kappa s(t) / s0) f_law,
 
 with s0 the RMS of the channel in the records for identification: in proportion to the channel for a sensitivity kappa of one,
-independent of it for zero. Limit and slopes of a law scale alike, as a contact's do with its normal force. A measured channel that
-is no load of one of the bench's rigs counts as scheduling, too.
+independent of it for zero. Limit and slopes of a law scale alike, as a contact's do with its normal force. The stiffness and the viscous
+damping of the nominal model follow a channel about its mean, by so much a standard deviation of it: their mean is the nominal
+parameter's own. A measured channel that is no load of one of the bench's rigs counts as scheduling, too.
 
 Where no channel tells, what dissipates may differ from record to record all the same: friction with the normal force, a
 magnetorheological damper with its current. It is then named with its size in each, which says that something has changed between the
@@ -83,6 +84,8 @@ def with_schedules(search: Search, asked: Collection[str]) -> None:
             tasks += _differing(problem, placed, start)
     if not channels and len(problem.records) > 1:
         tasks += _changing(search, asked)
+    for channel in channels:
+        tasks += _following(search, asked, channel)
     converge(search, tasks)
     converge(search, list(_of_one_size(search)))
 
@@ -112,6 +115,26 @@ def _changing(search: Search, asked: Collection[str]) -> list[Task]:
         for effect in CHANGES
         if len(place.rows) == 1 and differing_name(effect) in asked
         for task in _differing(problem, Placed(effect, place), np.append(still, effect.parameters[0].std))
+    ]
+
+
+def _following(search: Search, asked: Collection[str], channel: CaseChannel) -> list[Task]:
+    """Fits of a spring and of a damper that follow a channel about its mean, up with it and down."""
+    problem, still = search.problem, search.ranked(0)[0].vector
+    values = np.concatenate([record.values[channel.name] for record in problem.records])
+    mean, deviation = float(np.mean(values)), float(np.std(values))
+    if deviation <= np.finfo(float).eps * abs(mean):
+        return []
+    return [
+        (
+            (Placed(following(effect, channel), place, channel.name),),
+            np.array(
+                [np.append(still, [way * effect.parameters[0].std, mean, deviation]) for way in (1.0, -1.0)]
+            ),
+        )
+        for place in problem.structure.places
+        for effect in CHANGES
+        if len(place.rows) == 1 and FOLLOWED + effect.name in asked
     ]
 
 
@@ -217,6 +240,29 @@ def scheduled_by(effect: Effect, channel: CaseChannel, simulator: Simulator) -> 
         parameters=(*effect.parameters, SENSITIVITY, FreeParameter("reference", signed=True, fixed=True, unit=channel.unit or "1")),
         theta=own_theta, schedule=schedule, log_prior=effect.log_prior + 0.5 * EFFECT_SETTINGS.rare,
         rate_bound=None if bound is None else lambda values, scales: bound(values[:count], scales),
+    )  # fmt: skip
+
+
+def following(change: Effect, channel: CaseChannel) -> Effect:
+    """A change of a spring or of a damper that follows a channel about its mean in the records for identification."""
+    fixed = (
+        FreeParameter(name, signed=True, fixed=True, unit=channel.unit or "1")
+        for name in ("mean", "deviation")
+    )
+    theta = change.theta
+    assert theta is not None
+
+    def schedule(values: Values, record: CaseRecord) -> Values:
+        samples = record.values.get(channel.name)
+        if samples is None:
+            return np.array([0.0, 1.0, 2.0, 0.0, 0.0])
+        factor = (samples - values[1]) / values[2]
+        return np.concatenate([[record.start, 1.0 / record.step, float(len(samples))], factor])
+
+    return replace(
+        change, name=FOLLOWED + change.name, varies=change.name, parameters=(*change.parameters, *fixed),
+        equation=f"(s - mean)/deviation f, s = {channel.name}; {change.equation}", schedule=schedule,
+        theta=lambda values, scales: theta(values[:1], scales), log_prior=0.5 * EFFECT_SETTINGS.rare,
     )  # fmt: skip
 
 
