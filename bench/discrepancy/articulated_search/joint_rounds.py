@@ -29,7 +29,7 @@ def round_of(
     grounds = grounds_of(problem, current, settings)
     judged = problem.settings.articulated.judgement
     open_joints = {j for j, still in enumerate(quiet(current, judged)) if not still}
-    open_joints |= strained(problem, current, settings)
+    open_joints |= strained(problem, current, settings.strained)
     # behind an elastic drive the link is elsewhere, and all that hangs on it
     shared = [c for c in candidates if len(problem.reached((c,))) > 1 or c.effect.train or not open_joints]
     own = {j: [c for c in candidates if c.joint == j and c not in shared] for j in sorted(open_joints)}

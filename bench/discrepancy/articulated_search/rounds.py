@@ -97,7 +97,7 @@ def best_of(
         progress("screening")
         points = screen(soft, ground, candidates)
         if strained(
-            soft, ground, settings
+            soft, ground, settings.strained
         ):  # what stands in for the missing hides it; also from what was stated
             points += screen(soft, _untouched(soft, ground), candidates)
         progress("fits")
@@ -157,12 +157,12 @@ def parted(
     return heard > max(told, default=-np.inf) + settings.worth
 
 
-def strained(problem: ArticulatedProblem, base: ArticulatedFit, settings: SearchSettings) -> set[int]:
-    """Joints one of whose nominal parameters a fit has moved too far."""
+def strained(problem: ArticulatedProblem, base: ArticulatedFit, beyond: float) -> set[int]:
+    """Joints one of whose nominal parameters a fit has moved beyond some of its stated standard uncertainties."""
     carriers = {joint.body: j for j, joint in enumerate(problem.joints)}
     out: set[int] = set()
     for entry, moved in zip(problem.nominal, base.vector, strict=False):
-        if abs(moved) > settings.strained:
+        if abs(moved) > beyond:
             out |= {carriers[entry.target]} if entry.target in carriers else set(entry.joints)
     return out
 
@@ -306,7 +306,7 @@ def _fits(
     others = Others.of(problem, base)
     out: list[ArticulatedFit] = []
     swapped = 0
-    moved = strained(problem, base, settings)
+    moved = strained(problem, base, settings.strained)
     for k, mine in enumerate(points):
         if out and not problem.deadline.allows("fits of effects that promise less"):
             break

@@ -19,7 +19,14 @@ from bench.discrepancy.articulated_search.joint_rounds import round_of
 from bench.discrepancy.articulated_search.orders import roughly
 from bench.discrepancy.articulated_search.placements import apart
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.rounds import parted, quiet, sound
+from bench.discrepancy.articulated_search.rounds import (
+    best_of,
+    grounds_of,
+    parted,
+    quiet,
+    sound,
+    strained,
+)
 from bench.discrepancy.multibody.nominal_parameters import twins
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
@@ -86,10 +93,13 @@ def search(
         if corrected is not None and parted(problem, fits, corrected, settings):
             return search(corrected.problem, candidates, settings=settings, misled=misled, progress=progress)
         found += fits
-        if best is None or best.log_posterior < current.log_posterior + _needed(problem, current, settings):
-            break
-        if not _material(problem, found[0], current, best):
-            break
+        least = current.log_posterior + _needed(problem, current, settings)
+        if best is None or best.log_posterior < least or not _material(problem, found[0], current, best):
+            eased = _eased(problem, current, rest, settings)
+            if eased is None:
+                break
+            current, found = eased, [*found, eased]
+            continue
         problem = problem.settled(best.hypothesis, best.vector)
         before, added = current, len(best.hypothesis) - len(current.hypothesis)
         current, fits = without_idle(problem, best, settings, added=added)
@@ -100,6 +110,10 @@ def search(
         progress(f"round {count}: " + ", ".join(f"{p.effect.name} ({p.where})" for p in current.hypothesis))
         # one effect of two may predict worse than none, what follows something that helped does not
         if before.hypothesis and misled(problem, before, current):
+            eased = _eased(problem, current, _open(current, candidates, dropped, settings), settings)
+            if eased is not None and not misled(problem, before, eased):
+                current, found = eased, [*found, eased]
+                continue
             progress(f"round {count}: makes the judging records worse, no further one")
             break
     for end in (current, *given_up):
@@ -124,6 +138,28 @@ def _material(
     return complete(problem, after, judged) or any(
         bool(np.any(old - new > judged.small * first)) for first, old, new in (power, misfit)
     )
+
+
+def _eased(
+    problem: ArticulatedProblem,
+    current: ArticulatedFit,
+    candidates: Sequence[PlacedOnJoint],
+    settings: SearchSettings,
+) -> ArticulatedFit | None:
+    """A fit with a wrong number named instead of a nominal parameter that no judgement believes, where that is the likelier of the two.
+
+    A fit may move what was stated as far as the records ask; what it predicts is judged with the parameter no further out than is
+    believed, beside which nothing else that is right is seen to help.
+    """
+    far = strained(problem, current, problem.settings.articulated.judgement.strained)
+    instead = [c for c in candidates if c.effect.number and far.intersection(c.joints)]
+    if not instead or not problem.deadline.allows("wrong numbers in the place of nominal parameters"):
+        return None
+    grounds = grounds_of(problem, current, settings)
+    best = best_of(problem, current, grounds, instead, settings, lambda text: None).best
+    if best is None or best.log_posterior < current.log_posterior + settings.worth:
+        return None
+    return best if len(best.hypothesis) > len(current.hypothesis) else None
 
 
 def _open(
