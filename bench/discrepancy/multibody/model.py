@@ -57,7 +57,7 @@ class ArticulatedModel:
         model: The compiled model without damping, friction, springs, armature, limits and contacts.
         joints: Its joints in the order of its degrees of freedom, those that are followed left out.
         followed: Joints that move as measured, whatever moves them: those with a motor that stands for a motion.
-        bodies: Names of the bodies that move, see `body_name`.
+        bodies: Names of the bodies that move, by joints of their own or with another one, see `body_name`.
         tips: Body to the position of its tip in its own frame, where a payload would sit: a site called ``…tip``, else the joint of
             its only child, else its own centre of mass.
         ties: Joints that those move by equalities.
@@ -92,7 +92,7 @@ class ArticulatedModel:
         followed = tuple(j for j in every if j.drive is not None and j.drive.name.startswith(MOTION))
         joints = tuple(j for j in every if j not in followed)
         bare = _bare(model)
-        bodies = tuple(body_name(model, i) for i in range(1, model.nbody) if model.body_dofnum[i] > 0)
+        bodies = tuple(body_name(model, i) for i in range(1, model.nbody) if _moves(model, i))
         return cls(bare, joints, followed, bodies, {body: _tip(model, body) for body in bodies}, ties)
 
     def joint(self, name: str) -> Joint:
@@ -255,6 +255,11 @@ def _refuse(model: mujoco.MjModel, name: str) -> None:
                 f"joint '{model.joint(i).name}' of '{name}' is a {kind} joint; hinges and slides on a fixed base are expected: hang the "
                 "robot up (remove the free joint), lock a ball joint, or cut out the limb that was tested"
             )
+
+
+def _moves(model: mujoco.MjModel, i: int) -> bool:
+    """Whether body `i` has a joint, or a mass that moves with another body, to which it is fixed or behind a joint that is held."""
+    return model.body_dofnum[i] > 0 or (model.body_weldid[i] > 0 and model.body_mass[i] > 0.0)
 
 
 def _bare(model: mujoco.MjModel) -> mujoco.MjModel:

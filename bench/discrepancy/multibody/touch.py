@@ -21,7 +21,8 @@ def ends_of(model: ArticulatedModel) -> tuple[str, ...]:
         return ()
     carrying = {int(mj.body_weldid[mj.body_parentid[i]]) for i in range(1, mj.nbody) if mj.body_dofnum[i] > 0}
     bodies = [(name, body_index(mj, name)) for name in model.bodies]
-    return tuple(name for name, i in bodies if i not in carrying and shapes_of(mj, i))
+    ends = ((name, i) for name, i in bodies if mj.body_dofnum[i] > 0 and i not in carrying)
+    return tuple(name for name, i in ends if shapes_of(mj, i))
 
 
 def touch_of(model: ArticulatedModel, body: str, position: Array) -> LowestPoint:

@@ -17,6 +17,7 @@ from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import encoders_of
 from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.model import ArticulatedModel
+from bench.discrepancy.multibody.nominal_parameters import nominal_parameters
 from bench.discrepancy.precheck.positions import position_doubts
 from bench.discrepancy.precheck.timing import timing
 from bench.errors import BenchError, RecordingError
@@ -55,7 +56,9 @@ def admitted_joints(case: Case) -> tuple[Case | None, ArticulatedModel | None, l
             found.append(str(error))
             compiled = rig_of(case).model
             own = bound(case, compiled)
-        return own, ArticulatedModel.of(compiled), found
+        model = ArticulatedModel.of(compiled)
+        nominal_parameters(own, model)
+        return own, model, found
     except BenchError as error:
         return None, None, list(dict.fromkeys((*found, " ".join(str(error).split()))))
 
