@@ -36,6 +36,22 @@ def test_spikes_zeros_and_holds_are_found_where_they_are():
     assert np.max(np.abs(healed - motion()[:, 0])) < 0.05
 
 
+def test_dropouts_are_found_however_many_there_are_and_a_pause_of_what_was_asked_for_is_none():
+    values, lengths = motion(), [9, 20, 14, 25, 24, 8, 12]
+    firsts = [130 + 400 * k for k in range(len(lengths))]
+    for first, length in zip(firsts, lengths, strict=True):
+        values[first : first + length, 0] = 0.0
+    found, other = outliers(values)
+    assert other == []
+    assert found == [OutlierRun(f, f + n - 1) for f, n in zip(firsts, lengths, strict=True)]
+    healed = bridged(values[:, 0], found)
+    assert np.max(np.abs(healed - motion()[:, 0])) < 0.05
+    assert all(run.last - run.first < 10 for run in outliers(values, asked=(0,))[0])
+    # what friction stops stands still as well, and comes to rest by changes that get smaller
+    stick = np.maximum(np.sin(30.0 * TIME) - 0.3, 0.0) * np.cos(2.0 * TIME) ** 2
+    assert outliers(stick[:, None]) == [[]]
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -2,7 +2,8 @@
 
 A sample is predicted by the cubic through its two neighbours on either side. Where one channel is off by many times what is usual about
 it, and goes on as if nothing had been once a few samples are taken out, these were never measured. What several channels show at
-once, what happens over and over in a record (impacts, switching), and what does not heal (a step) belongs to the record.
+once, what happens over and over in a record (impacts, switching), and what does not heal (a step) belongs to the record. A channel
+that changes with every sample, jumps to one value, holds it and jumps back, was not read meanwhile, however often that happens.
 
 References:
     F. R. Hampel, J. Am. Stat. Assoc. 69 (1974) 383-393 (departures in units of the median of absolute ones).
@@ -10,7 +11,7 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -32,6 +33,11 @@ class OutlierSettings:
         block: Samples over which what is usual is taken.
         longest: Successive samples that are taken out at most where they are no hold: what lasts longer may have been.
         longest_hold: The same of a hold.
+        longest_dropout: The same of a hold that a jump leads to and another leads back from; what is longer is no gap that neighbours tell
+            anything of.
+        steady: Part of the changes from sample to sample that may be none in a channel that has dropouts: one that is held between its
+            samples, or has coarse steps, stands still as a rule.
+        abrupt: Changes of the sample before by which a jump is one: what friction stops comes to rest by changes that get smaller.
         most: Part of a record that outliers are at most; and their number, in a short one. What is more frequent belongs to it.
         fewest: That number.
     """
@@ -43,6 +49,9 @@ class OutlierSettings:
     block: int = 256
     longest: int = 1
     longest_hold: int = 10
+    longest_dropout: int = 64
+    steady: float = 0.2
+    abrupt: float = 2.0
     most: float = 5e-4
     fewest: int = 3
 
@@ -57,12 +66,15 @@ class OutlierRun(NamedTuple):
     last: int
 
 
-def outliers(values: Array, settings: OutlierSettings = SETTINGS) -> list[list[OutlierRun]]:
+def outliers(
+    values: Array, settings: OutlierSettings = SETTINGS, *, asked: Collection[int] = ()
+) -> list[list[OutlierRun]]:
     """Runs of samples of each channel that were never measured.
 
     Args:
         values: Samples on a uniform clock, ``(n, n_channels)``.
         settings: What counts as one.
+        asked: Channels that hold what was asked for: a pause in them is none of the logger.
 
     Returns:
         One list a channel.
@@ -70,6 +82,8 @@ def outliers(values: Array, settings: OutlierSettings = SETTINGS) -> list[list[O
     n, count = values.shape
     if n < settings.block:
         return [[] for _ in range(count)]
+    lost = [[] if c in asked else dropouts(column, settings) for c, column in enumerate(values.T)]
+    values = np.column_stack([bridged(column, runs) for column, runs in zip(values.T, lost, strict=True)])
     size = [_departure(column, settings) for column in values.T]
     found = [_runs(column, own, settings) for column, own in zip(values.T, size, strict=True)]
     alone: list[list[OutlierRun]] = []
@@ -78,7 +92,30 @@ def outliers(values: Array, settings: OutlierSettings = SETTINGS) -> list[list[O
         kept = [run for run in runs if _held(column, run) or not _shared(run, others, settings)]
         few = len(kept) <= max(settings.fewest, settings.most * n)
         alone.append([run for run in kept if few and (_held(column, run) or _aside(column, run, settings))])
-    return alone
+    return [sorted((*more, *runs)) for more, runs in zip(lost, alone, strict=True)]
+
+
+def dropouts(column: Array, settings: OutlierSettings = SETTINGS) -> list[OutlierRun]:
+    """Runs of a channel (n,) that changes with every sample, in which it holds a value to which, or from which, it jumps.
+
+    What it holds at an end of its range is clipped, and was there.
+    """
+    change = np.diff(column)
+    still = change == 0.0
+    if not still.any() or np.mean(still) > settings.steady:
+        return []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
+    usual = 1.4826 * float(np.median(np.abs(np.diff(change))))
+    least = max(settings.clear * usual, settings.large * float(np.std(column)))
+    out = []
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if first > 1 and last < len(column) - 2 and last - first < settings.longest_dropout:
+            away = abs(change[first - 1]) - settings.abrupt * abs(change[first - 2])
+            back = abs(change[last]) - settings.abrupt * abs(change[last + 1])
+            ranged = column[first] != 0.0 and column[first] in (column.min(), column.max())
+            if max(away, back) > least and not ranged:
+                out.append(OutlierRun(int(first), int(last)))
+    return out
 
 
 def bridged(column: Array, runs: Sequence[OutlierRun]) -> Array:
@@ -154,8 +191,9 @@ def _aside(column: Array, run: OutlierRun, settings: OutlierSettings) -> bool:
 
 
 def _bridge(column: Array, run: OutlierRun) -> None:
-    """Replace a run by the cubic through two samples on either side, in place."""
-    known = np.array([run.first - 2, run.first - 1, run.last + 1, run.last + 2])
+    """Replace a run by the cubic through as many samples as half of its own on either side, two at least, in place."""
+    beside = np.arange(1, max(2, (run.last - run.first + 1) // 2) + 1)
+    known = np.concatenate([run.first - beside[::-1], run.last + beside])
     inside = np.arange(run.first, run.last + 1)
     if known[0] < 0 or known[-1] >= len(column):
         column[inside] = column[np.clip(run.first - 1, 0, None)]

@@ -14,7 +14,7 @@ first two, what is not stated is looked for in the records (`search.load_interpo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -244,6 +244,7 @@ def record_from_arrays(
     at_rest: bool = True,
     periodic: bool = False,
     notes: Sequence[str] = (),
+    asked: Collection[str] = (),
 ) -> CaseRecord:
     """Build a record on a uniform clock; the arrays are copied and made read-only.
 
@@ -257,6 +258,7 @@ def record_from_arrays(
         at_rest: Whether it starts at rest.
         periodic: Whether it is one or more whole periods of a steady state.
         notes: What is known of its file already.
+        asked: Channels that hold what was asked for, see `outliers`.
 
     Raises:
         RecordingError: Too short, not uniform in time, longer dropouts, or channels of another length.
@@ -271,7 +273,8 @@ def record_from_arrays(
         noted = on_one_clock(clock, {channel: np.asarray(v, dtype=float) for channel, v in values.items()})
     except RecordingError as error:
         raise RecordingError(f"record '{name}': {error}") from None
-    columns, odd, lost = {}, outliers(noted.values), set(_missing(clock, values, noted))
+    planned = [c for c, channel in enumerate(values) if channel in asked]
+    columns, odd, lost = {}, outliers(noted.values, asked=planned), set(_missing(clock, values, noted))
     more = []
     for channel, samples, runs in zip(values, noted.values.T, odd, strict=True):
         column = bridged(samples, runs)

@@ -199,7 +199,10 @@ def _read_record(
             else ""
         )
         notes = (*notes, f"columns that nominal.json does not name are not used: {listed}{more}")
-    return record_from_arrays(name, time, arrays, at_rest=at_rest, notes=(*contents.notes, *notes))
+    asked = [channel.name for channel in known.channels if channel.role == "command"]
+    return record_from_arrays(
+        name, time, arrays, at_rest=at_rest, notes=(*contents.notes, *notes), asked=asked
+    )
 
 
 def _with_responses(contents: Columns, known: _Channels, file: Path) -> Columns:

@@ -14,7 +14,7 @@ from bench.discrepancy.model.mjcf_prescribed import prescribed_channels, with_pr
 from bench.errors import ModelError, UnknownNameError
 from bench.rig import Rig
 from bench.rig.building import parse
-from bench.rig.held_joints import followed, with_held_joints
+from bench.rig.held_joints import followed, held, with_held_joints
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,22 @@ def rig_of(case: Case) -> Rig:
         actuator = spec.add_actuator(name=NO_LOAD, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         actuator.set_to_motor()
     return Rig(rig.name, spec.to_xml(), timestep=rig.timestep, folder=rig.folder)
+
+
+def idle_parts(case: Case) -> dict[str, str]:
+    """Joints that were held or are followed, and their actuators, by name: which of the two the joint did."""
+    joints = case.options.get("joints")
+    how = dict.fromkeys(held(joints), "held") | dict.fromkeys(followed(joints), "followed")
+    if not how:
+        return {}
+    model = Rig.from_file(Path(case.folder or ".") / case.rig).model
+    of_joint = int(mujoco.mjtTrn.mjTRN_JOINT)
+    driven = {
+        model.actuator(u).name: model.joint(int(model.actuator_trnid[u, 0])).name
+        for u in range(model.nu)
+        if int(model.actuator_trntype[u]) == of_joint
+    }
+    return how | {actuator: how[joint] for actuator, joint in driven.items() if joint in how}
 
 
 def _followed(case: Case, rig: Rig) -> set[str]:
