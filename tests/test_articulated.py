@@ -278,11 +278,13 @@ def test_a_joint_that_was_held_is_welded_where_it_was(tmp_path):
     document = json.loads((folder / "nominal.json").read_text())
     for name in ("elbow_in", "elbow_q"):
         del document["channels"][name]
-    for name in ("damping:elbow", "kp:elbow_drive"):
-        del document["parameters"][name]
     document["joints"] = {"elbow": 0.4}
     (folder / "nominal.json").write_text(json.dumps(document))
     admitted = admitted_robot(read_case(folder), anyway=True)
+    assert [note for note in admitted.notes if note.endswith("its joint is held")] == [
+        "'damping:elbow' changes nothing: its joint is held",
+        "'kp:elbow_drive' changes nothing: its joint is held",
+    ]
     # the body behind it hangs on the shoulder all the same, and its mass may be uncertain
     problem = ArticulatedProblem.of(
         admitted.case, ArticulatedModel.of(admitted.compiled), admitted.case.identification

@@ -40,7 +40,7 @@ class CheckingSettings:
 SETTINGS = CheckingSettings()
 UNUSED = "columns that nominal.json does not name are not used"
 """Beginning of a note that is no doubt."""
-DONE = ("; converted to ", "counted from")
+DONE = ("; converted to ", "counted from", "changes nothing: its joint is")
 """Parts of what admission says that tell of something done, of which nothing can be wrong."""
 
 
