@@ -165,7 +165,7 @@ def _finalists(
     best = found[
         int(np.argmin([entry.total - 2.0 * prior for entry, prior in zip(found, priors, strict=True)]))
     ]
-    base = _pruned(best, found, known, settings)
+    base = _evened(_pruned(best, found, known, settings), found, explanations)
     base = _unvaried(base, found, settings) or base
     found = [own for own in found if own is base or _unvaried(own, found, settings) is None]
     # what is larger than what is material has been weighed already
@@ -178,6 +178,14 @@ def _unvaried(entry: HeldOut, found: Sequence[HeldOut], settings: CoarseSettings
     return min(
         (o for o in alike if _as_good(o, entry, settings)), key=lambda other: other.total, default=None
     )
+
+
+def _evened(entry: HeldOut, found: Sequence[HeldOut], explanations: Sequence[Explanation]) -> HeldOut:
+    """The same effects of one size, where sizes that may differ hardly do: an effect beside them may have been pruned."""
+    if not differs_in_vain(entry.explanation, explanations):
+        return entry
+    even = next(e for e in explanations if steadier(e, entry.explanation))
+    return _held_out_as(bounded(even, found[0].explanation.settings.judgement.coarse.within), found)
 
 
 def _with(entry: HeldOut, own: HeldOut, found: Sequence[HeldOut]) -> list[HeldOut]:
