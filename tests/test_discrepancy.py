@@ -26,7 +26,7 @@ from bench.discrepancy.blind.proportions import calibration_error
 from bench.discrepancy.blind.protocol import draw_case, write_case
 from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.effects.effect import Scales
-from bench.discrepancy.judgement.validation_discrepancy import closed_share, nrmse
+from bench.discrepancy.prediction.validation_discrepancy import closed_share, nrmse
 from bench.errors import FileFormatError, ParameterError, RecordingError, UnknownNameError
 
 SCALES = Scales(2.0, 0.01, 0.2, 500.0, 20.0, 1e-3, 2.0, 0.01, 0.2)

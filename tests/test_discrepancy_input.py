@@ -19,10 +19,10 @@ from bench.discrepancy import (
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.initial_state_fit import predict, run_kind, start_warnings
 from bench.discrepancy.fitting.map_fit import fit
-from bench.discrepancy.judgement.validation_discrepancy import nrmse
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.prediction.validation_discrepancy import nrmse
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.settings import DEFAULT, with_values
 from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, Elements, StructureMatrices, free_run

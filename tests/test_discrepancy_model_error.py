@@ -14,10 +14,9 @@ from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.fits import Search
 from bench.discrepancy.fitting.goodness_of_fit import complexity, leaves_much
 from bench.discrepancy.fitting.map_fit import fit
-from bench.discrepancy.judgement.coarse import Judged, bounded, judge, no_larger, without
-from bench.discrepancy.judgement.discrepancies import Discrepancies
+from bench.discrepancy.judgement.coarse import Judged, judge
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
-from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
+from bench.discrepancy.judgement.finalists import bounded, no_larger, without
 from bench.discrepancy.likelihood.model_error import (
     ModelInadequacy,
     band_weights,
@@ -30,6 +29,8 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.localisation.remainder import free_force
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.prediction.discrepancies import Discrepancies
+from bench.discrepancy.prediction.held_out import HeldOut, held_out, shares
 from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.extension import Offers, begun_faint, first_fit
 from bench.discrepancy.settings import DEFAULT

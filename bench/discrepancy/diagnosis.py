@@ -2,7 +2,7 @@
 
 The steps, each in its own room: read the case (`case`), find what it leaves unstated of its records (`checks.initial_motion`,
 `search.load_interpolation`), screen the catalogue and fit what is promising (`screening`, `fitting`, `search`), weigh the
-explanations and doubt the best one (`judgement`), run the judging records with each (`judgement.validation_discrepancy`), and say
+explanations and doubt the best one (`judgement`), run the judging records with each (`prediction.validation_discrepancy`), and say
 where the residuals of the nominal model gather (`localisation`). docs/architecture.md draws the rooms.
 """
 
@@ -35,7 +35,6 @@ from bench.discrepancy.fitting.initial_state_fit import start_warnings
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.closing import as_borne_out, complete, nominal_estimates, with_closed
 from bench.discrepancy.judgement.finding import Finding
-from bench.discrepancy.judgement.run_on import rest_of_records
 from bench.discrepancy.judgement.stages import shrunk
 from bench.discrepancy.judgement.two_regimes import How, Tell, found_of
 from bench.discrepancy.likelihood.problem import Problem
@@ -44,6 +43,7 @@ from bench.discrepancy.localisation.remainder import remainder
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.next_test.discriminating_excitation import separate, told_apart
 from bench.discrepancy.numerics.deadline import Deadline
+from bench.discrepancy.prediction.run_on import rest_of_records
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed

@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 
 from bench.discrepancy import BlindOptions, BlindScore, diagnose, make_blind, read_case, score_blind
 from bench.discrepancy.case.case import Case, CaseRecord
-from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP, coordinates, noise_level, nrmse
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
+from bench.discrepancy.prediction.validation_discrepancy import DIVERGED_GAP, coordinates, noise_level, nrmse
 from bench.files import write_text
 from benchmarks.new_process import in_new_process, memory_row
 from benchmarks.timing import Row

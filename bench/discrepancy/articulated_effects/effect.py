@@ -110,6 +110,11 @@ class ArticulatedEffect:
         return sum(not p.fixed for p in self.parameters)
 
     @property
+    def bodily(self) -> bool:
+        """Whether it changes what the bodies ask of all joints."""
+        return self.site in ("body", "base")
+
+    @property
     def train(self) -> bool:
         """Whether it is an elastic drive train between motor and link."""
         return self.slots is train

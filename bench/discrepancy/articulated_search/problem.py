@@ -276,11 +276,7 @@ class ArticulatedProblem:
                 entry = self.nominal[i]
                 changed.setdefault(entry.target, {})[entry.kind] = entry.deviation(vector, i)
         placed = zip(hypothesis, self.etas(hypothesis, vector), strict=True)
-        missing = [
-            (p.where, p.effect.values(eta, p.scales))
-            for p, eta in placed
-            if p.effect.site in ("body", "base")
-        ]
+        missing = [(p.where, p.effect.values(eta, p.scales)) for p, eta in placed if p.effect.bodily]
         return BodyNumbers(changed, missing)
 
     @cached_property

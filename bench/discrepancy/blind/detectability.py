@@ -88,9 +88,9 @@ def lasting(pure: Case, true: Mapping[str, float]) -> Lasting:
     Raises:
         BenchError: The nominal model cannot be fitted.
     """
-    from bench.discrepancy.judgement.validation_discrepancy import errors_by_block  # noqa: PLC0415
     from bench.discrepancy.likelihood.problem import Problem  # noqa: PLC0415
     from bench.discrepancy.model.rigs import structure_of  # noqa: PLC0415
+    from bench.discrepancy.prediction.validation_discrepancy import errors_by_block  # noqa: PLC0415
     from bench.discrepancy.search.explanation import Explanation  # noqa: PLC0415
 
     structure = structure_of(pure)

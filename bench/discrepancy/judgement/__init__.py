@@ -1,1 +1,1 @@
-"""From fits to a verdict: posterior, predictive checks, the discrepancy on validation records."""
+"""From fits to a verdict: posterior, predictive checks, what is named."""

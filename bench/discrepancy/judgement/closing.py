@@ -14,9 +14,9 @@ import numpy as np
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.goodness_of_fit import key_of
-from bench.discrepancy.judgement.coarse import without
-from bench.discrepancy.judgement.validation_discrepancy import part_closed
+from bench.discrepancy.judgement.finalists import without
 from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.prediction.validation_discrepancy import part_closed
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.settings import JudgementSettings
 from bench.discrepancy.verdict import Gap, NamedEffect, NominalEstimate, Ranked

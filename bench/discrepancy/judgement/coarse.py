@@ -16,15 +16,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.fitting.goodness_of_fit import complexity, free_parameters, key_of, log_prior_of
-from bench.discrepancy.fitting.map_fit import fit
-from bench.discrepancy.judgement.discrepancies import Discrepancies
+from bench.discrepancy.fitting.goodness_of_fit import complexity
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
-from bench.discrepancy.judgement.held_out import HeldOut, held_out, shares
+from bench.discrepancy.judgement.finalists import (
+    as_good,
+    finalists,
+    held_out_as,
+    without,
+)
 from bench.discrepancy.likelihood.problem import Array, Problem
-from bench.discrepancy.search.explanation import Explanation, nominal_alone
+from bench.discrepancy.prediction.discrepancies import Discrepancies
+from bench.discrepancy.prediction.held_out import HeldOut, shares
+from bench.discrepancy.search.explanation import Explanation
 from bench.discrepancy.search.steady import diverges, steadied
-from bench.discrepancy.search.varied_size import differs_in_vain, steadier
 from bench.discrepancy.settings import CoarseSettings
 
 
@@ -100,9 +104,9 @@ def judge(
     """
     judgement = problem.settings.judgement
     settings, known = judgement.coarse, Discrepancies(case, problem)
-    found = _finalists(explanations, known, settings)
+    found = finalists(explanations, known, settings)
     base, nothing = found[0], next(e for e in found if not e.explanation.hypothesis)
-    within = alike = tuple(entry for entry in found if _as_good(entry, base, settings))
+    within = alike = tuple(entry for entry in found if as_good(entry, base, settings))
     part = settings.most if trusted else settings.pays
     chosen, vetoed = nothing, False
     for own in sorted(within, key=_plainness):
@@ -113,7 +117,7 @@ def judge(
                 other
                 for other in found
                 if known.prefers(other.explanation, entry.explanation)
-                or _as_good(other, base, settings, judgement.coarse_alike)
+                or as_good(other, base, settings, judgement.coarse_alike)
             )
             break
         vetoed = True
@@ -150,44 +154,6 @@ def _doubts(chosen: Explanation, nothing: Explanation, known: Discrepancies) -> 
     return out
 
 
-def _finalists(
-    explanations: Sequence[Explanation], known: Discrepancies, settings: CoarseSettings
-) -> list[HeldOut]:
-    """What is near the likeliest on held-out blocks, the best first, without effects that close nothing material; the nominal model
-    alone among them."""
-    nothing = bounded(nominal_alone(explanations), settings.within)
-    told = [e for e in explanations if e.hypothesis and not differs_in_vain(e, explanations)]
-    with_effects = told[: 2 * settings.finalists]
-    ranked = sorted((bounded(e, settings.within) for e in with_effects), key=lambda e: -e.log_posterior)
-    near = [e for e in ranked if e.log_posterior > ranked[0].log_posterior - settings.reach]
-    found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
-    priors = np.array([_log_prior(entry.explanation) for entry in found])
-    best = found[
-        int(np.argmin([entry.total - 2.0 * prior for entry, prior in zip(found, priors, strict=True)]))
-    ]
-    base = _evened(_pruned(best, found, known, settings), found, explanations)
-    base = _unvaried(base, found, settings) or base
-    found = [own for own in found if own is base or _unvaried(own, found, settings) is None]
-    # what is larger than what is material has been weighed already
-    return [base, *(e for e in found if e is not base and no_larger(e.explanation, base.explanation))]
-
-
-def _unvaried(entry: HeldOut, found: Sequence[HeldOut], settings: CoarseSettings) -> HeldOut | None:
-    """The same effects, fewer of them of a size that follows something, where they predict as well: then nothing says that it does."""
-    alike = (other for other in found if steadier(other.explanation, entry.explanation))
-    return min(
-        (o for o in alike if _as_good(o, entry, settings)), key=lambda other: other.total, default=None
-    )
-
-
-def _evened(entry: HeldOut, found: Sequence[HeldOut], explanations: Sequence[Explanation]) -> HeldOut:
-    """The same effects of one size, where sizes that may differ hardly do: an effect beside them may have been pruned."""
-    if not differs_in_vain(entry.explanation, explanations):
-        return entry
-    even = next(e for e in explanations if steadier(e, entry.explanation))
-    return _held_out_as(bounded(even, found[0].explanation.settings.judgement.coarse.within), found)
-
-
 def _with(entry: HeldOut, own: HeldOut, found: Sequence[HeldOut]) -> list[HeldOut]:
     """Finalists with one of them as it is named: moved, or without effects that are not borne out, which may be a finalist as well."""
     if entry in found:
@@ -210,22 +176,6 @@ def _steady(entry: HeldOut, case: Case, rng: np.random.Generator) -> HeldOut:
     return entry if moved is None else replace(entry, explanation=moved)
 
 
-def bounded(explanation: Explanation, within: float) -> Explanation:
-    """An explanation whose nominal parameters stay within so many stated standard deviations, fitted again where they do not.
-
-    So do those of whatever is made of it, without one of its effects, say: else a parameter would silently stand in for that.
-    """
-    parts = []
-    for problem, fitted in explanation.parts:
-        narrow, iterations = problem.bounded(within), explanation.settings.search.thorough
-        beyond = np.any(np.abs(fitted.vector[: problem.n_physical]) > within)
-        again = (
-            fit(narrow, fitted.hypothesis, start=fitted.vector, iterations=iterations) if beyond else fitted
-        )
-        parts.append((narrow, again))
-    return Explanation(tuple(parts))
-
-
 def _log_priors(found: Sequence[HeldOut]) -> Array:
     """Log priors (n,) of explanations: by what they take to be described, and shared by those of the same names at the same places."""
     names = [frozenset((p.effect.name, p.place.name) for p in e.explanation.hypothesis) for e in found]
@@ -235,59 +185,9 @@ def _log_priors(found: Sequence[HeldOut]) -> Array:
     return np.array([value - np.log(names.count(own)) for value, own in zip(plain, names, strict=True)])
 
 
-def _log_prior(explanation: Explanation) -> float:
-    return log_prior_of(explanation.hypothesis, settings=explanation.settings.search)
-
-
-def _as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: float = 1.0) -> bool:
-    """Whether an explanation predicts as well as the best one: within a standard error, or what so few samples cannot tell."""
-    worse, error = entry.worse_than(best)
-    return entry is best or worse <= max(errors * error, settings.telling)
-
-
 def _plainness(entry: HeldOut) -> tuple[float, float]:
     """What comes first is simpler: fewer parameters, fewer and commoner effects; and then what predicts better."""
     return (complexity(entry.explanation.hypothesis, settings=entry.explanation.settings.search), entry.total)
-
-
-def no_larger(explanation: Explanation, other: Explanation) -> bool:
-    """Whether an explanation has no more effects than another one, fewer numbers to bend, or takes no more to be described."""
-    own, theirs = explanation.hypothesis, other.hypothesis
-    few = len(own) <= len(theirs) or free_parameters(own) < free_parameters(theirs)
-    settings = explanation.settings.search
-    return few or complexity(own, settings=settings) <= complexity(theirs, settings=settings)
-
-
-def _pruned(
-    entry: HeldOut, found: Sequence[HeldOut], known: Discrepancies, settings: CoarseSettings
-) -> HeldOut:
-    """An explanation without the effects that close nothing material beside the others."""
-    nothing = next(e for e in found if not e.explanation.hypothesis)
-    while entry.explanation.hypothesis:
-        smaller = [(i, without(entry.explanation, i)) for i in range(len(entry.explanation.hypothesis))]
-        if len(smaller) == 1:
-            smaller = [(0, nothing.explanation)]
-        closed = [known.closed(entry.explanation, rest, nothing.explanation) for _, rest in smaller]
-        least = int(np.argmin(closed))
-        if closed[least] >= settings.material or _accounts_for_it(
-            entry.explanation, smaller[least][1], known
-        ):
-            return entry
-        entry = _held_out_as(smaller[least][1], found)
-    return entry
-
-
-def _accounts_for_it(explanation: Explanation, rest: Explanation, known: Discrepancies) -> bool:
-    """Whether an effect is likelier than not the cause of what the others leave, where that is more than a right model would.
-
-    What they leave may be small beside a large discrepancy and be an effect all the same: friction beside a gap. The rule is that of
-    `outside` at even odds: small things besides are no rarer than a further effect.
-    """
-    settings = explanation.settings
-    lacking, left = known.beside(explanation, rest)
-    if lacking <= settings.likelihood.error.crude:
-        return False
-    return outside(left, replace(settings.judgement.coarse, outside=0.5)) < 0.5
 
 
 def _borne_out(entry: HeldOut, found: Sequence[HeldOut], known: Discrepancies) -> HeldOut:
@@ -298,43 +198,5 @@ def _borne_out(entry: HeldOut, found: Sequence[HeldOut], known: Discrepancies) -
         worst = int(np.argmax(harm))
         if harm[worst] <= 1.0:
             return entry
-        entry = _held_out_as(smaller[worst], found)
+        entry = held_out_as(smaller[worst], found)
     return entry
-
-
-def _held_out_as(explanation: Explanation, found: Sequence[HeldOut]) -> HeldOut:
-    """An explanation on held-out blocks, the finalist of the same effects where there is one."""
-    known = {key_of(e.explanation.hypothesis): e for e in found}
-    return known.get(key_of(explanation.hypothesis)) or held_out(explanation)
-
-
-def without(explanation: Explanation, index: int) -> Explanation:
-    """An explanation without one of its effects, fitted again from where it was.
-
-    Args:
-        explanation: Fitted.
-        index: Of the effect in its hypothesis.
-    """
-    if index not in explanation.smaller:
-        explanation.smaller[index] = _without(explanation, index)
-    return explanation.smaller[index]
-
-
-def _without(explanation: Explanation, index: int) -> Explanation:
-    parts = []
-    for problem, fitted in explanation.parts:
-        if not 0 <= index < len(fitted.hypothesis):
-            parts.append((problem, fitted))
-            index -= len(fitted.hypothesis)
-            continue
-        _, etas = problem.split(fitted.hypothesis, fitted.vector)
-        rest = fitted.hypothesis[:index] + fitted.hypothesis[index + 1 :]
-        kept = np.concatenate([fitted.vector[: len(problem.nominal)], *etas[:index], *etas[index + 1 :]])
-        starts = np.array(
-            [kept, np.concatenate([np.zeros(len(problem.nominal)), *etas[:index], *etas[index + 1 :]])]
-        )
-        parts.append(
-            (problem, fit(problem, rest, start=starts, iterations=explanation.settings.search.thorough))
-        )
-        index = -1
-    return Explanation(tuple(parts))

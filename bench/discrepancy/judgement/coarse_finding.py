@@ -12,13 +12,13 @@ from bench.discrepancy.fitting.goodness_of_fit import consistent, names
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.coarse import Judged, judge, kinds_of
-from bench.discrepancy.judgement.discrepancies import Discrepancies
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
 from bench.discrepancy.likelihood.model_error import ModelInadequacy, crude_error, error_left, own_noise
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
+from bench.discrepancy.prediction.discrepancies import Discrepancies
 from bench.discrepancy.screening.score_test import lack_of_fit
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.settings import DiagnosisSettings

@@ -10,10 +10,10 @@ import numpy as np
 from bench.discrepancy.effects.effect import unit_of
 from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.judgement.shares import percent
-from bench.discrepancy.judgement.validation_discrepancy import (
+from bench.discrepancy.model.placement import Placed
+from bench.discrepancy.prediction.validation_discrepancy import (
     closed_share,
 )
-from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.search.explanation import Explanation, nominal_alone, plainest
 from bench.discrepancy.settings import DEFAULT, JudgementSettings
 from bench.discrepancy.verdict import Estimate, Gap, NamedEffect, Ranked, VerdictKind

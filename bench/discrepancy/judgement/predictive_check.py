@@ -17,8 +17,8 @@ import numpy as np
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import Fit, fit
-from bench.discrepancy.judgement.validation_discrepancy import coordinates, noise_level
 from bench.discrepancy.likelihood.problem import Array, Problem
+from bench.discrepancy.prediction.validation_discrepancy import coordinates, noise_level
 from bench.discrepancy.response.initial_states import in_motion
 from bench.discrepancy.search.explanation import Explanation
 

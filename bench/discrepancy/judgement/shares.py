@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from bench.discrepancy.judgement.validation_discrepancy import (
+from bench.discrepancy.prediction.validation_discrepancy import (
     DIVERGED_GAP,
 )
 from bench.discrepancy.settings import DEFAULT, JudgementSettings

@@ -10,9 +10,9 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.effects.nonparametric import CLOSURES
 from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.judgement.nonparametric_rival import Rival
-from bench.discrepancy.judgement.validation_discrepancy import gaps, nominal_prediction
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.placement import Hypothesis
+from bench.discrepancy.prediction.validation_discrepancy import gaps, nominal_prediction
 from bench.discrepancy.search.closures import close
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.verdict import Gap, VerdictKind

@@ -15,8 +15,8 @@ from bench.discrepancy.application.drives import LOGGED
 from bench.discrepancy.application.forces import values_of
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.effects.catalogue import CATALOGUE
-from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP, coordinates
 from bench.discrepancy.model.structure import Structure
+from bench.discrepancy.prediction.validation_discrepancy import DIVERGED_GAP, coordinates
 from bench.discrepancy.replay.running import Reading, Stretch, controls, hook_of, run, sampled
 from bench.discrepancy.response.initial_states import in_motion
 from bench.discrepancy.response.windows import cut, drifts

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.judgement.shares import closed_words, interval, probability
-from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP
+from bench.discrepancy.prediction.validation_discrepancy import DIVERGED_GAP
 from bench.discrepancy.settings import DEFAULT, JudgementSettings
 from bench.discrepancy.verdict import Location, NamedEffect, Verdict, by_name
 

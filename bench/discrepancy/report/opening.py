@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bench.discrepancy.judgement.validation_discrepancy import DIVERGED_GAP
+from bench.discrepancy.prediction.validation_discrepancy import DIVERGED_GAP
 from bench.discrepancy.report.answers import Files, answers, next_steps
 from bench.discrepancy.report.interactive import histories, ranking_plot
 from bench.discrepancy.report.simulated_records import APPLIED

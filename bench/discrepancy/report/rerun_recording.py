@@ -11,10 +11,10 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
-from bench.discrepancy.judgement.validation_discrepancy import coordinates
 from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.localisation.localise import box
 from bench.discrepancy.localisation.state_map import StateMap
+from bench.discrepancy.prediction.validation_discrepancy import coordinates
 from bench.discrepancy.report.articulated import write_articulated_rerun
 from bench.discrepancy.report.simulated_records import MEASURED, place_channels, variants
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench.discrepancy.case.case import CaseRecord
-from bench.discrepancy.judgement.validation_discrepancy import coordinates, nominal_prediction
 from bench.discrepancy.likelihood.problem import Array
 from bench.discrepancy.localisation.force_smoother import observers
 from bench.discrepancy.localisation.localise import known_parameters
+from bench.discrepancy.prediction.validation_discrepancy import coordinates, nominal_prediction
 from bench.recording import Recording
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ import numpy as np
 
 from bench.arrays import Array
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.judgement.validation_discrepancy import (
+from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.prediction.validation_discrepancy import (
     DIVERGED_GAP,
     errors_by_block,
     noise_floors,
     nominal_prediction,
 )
-from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.search.explain import Explanation
 
 

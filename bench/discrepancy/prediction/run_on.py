@@ -9,8 +9,8 @@ import numpy as np
 from bench.arrays import Array
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.checks.long_records import begun_at
-from bench.discrepancy.judgement.validation_discrepancy import errors_by_block
 from bench.discrepancy.likelihood.problem import Problem
+from bench.discrepancy.prediction.validation_discrepancy import errors_by_block
 from bench.discrepancy.search.explanation import Explanation
 
 

@@ -1,0 +1,178 @@
+"""What is named is one of few: what predicts near the best, without effects that close nothing material, and without what is larger.
+
+An explanation that loses an effect, since that closes nothing material, is no longer the likeliest of its size for sure: what was out of
+reach of the larger one is then weighed as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bench.discrepancy.fitting.goodness_of_fit import complexity, free_parameters, key_of, log_prior_of
+from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement.doubt import outside
+from bench.discrepancy.prediction.discrepancies import Discrepancies
+from bench.discrepancy.prediction.held_out import HeldOut, held_out
+from bench.discrepancy.search.explanation import Explanation, nominal_alone
+from bench.discrepancy.search.varied_size import differs_in_vain, steadier
+from bench.discrepancy.settings import CoarseSettings
+
+
+def finalists(
+    explanations: Sequence[Explanation], known: Discrepancies, settings: CoarseSettings
+) -> list[HeldOut]:
+    """What is near the likeliest on held-out blocks, the best first, without effects that close nothing material; the nominal model
+    alone among them."""
+    nothing = bounded(nominal_alone(explanations), settings.within)
+    told = [e for e in explanations if e.hypothesis and not differs_in_vain(e, explanations)]
+    with_effects = told[: 2 * settings.finalists]
+    ranked = sorted((bounded(e, settings.within) for e in with_effects), key=lambda e: -e.log_posterior)
+    near = [e for e in ranked if e.log_posterior > ranked[0].log_posterior - settings.reach]
+    found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
+    best = min(found, key=_surprise)
+    base = _pruned(best, found, known, settings)
+    if base is not best and base.explanation.hypothesis:  # what was out of reach of more is not of less
+        found += [held_out(e) for e in _in_reach(base, ranked, found, settings)]
+        few = len(base.explanation.hypothesis)
+        base = min((e for e in (base, *found) if 0 < len(e.explanation.hypothesis) <= few), key=_surprise)
+    base = _evened(base, found, explanations)
+    base = _unvaried(base, found, settings) or base
+    found = [own for own in found if own is base or _unvaried(own, found, settings) is None]
+    # what is larger than what is material has been weighed already
+    return [base, *(e for e in found if e is not base and no_larger(e.explanation, base.explanation))]
+
+
+def _surprise(entry: HeldOut) -> float:
+    """Misfit of what it did not see, and minus twice its log prior."""
+    return entry.total - 2.0 * _log_prior(entry.explanation)
+
+
+def _in_reach(
+    base: HeldOut, ranked: Sequence[Explanation], found: Sequence[HeldOut], settings: CoarseSettings
+) -> list[Explanation]:
+    """Explanations of no more effects than one that was pruned, near it, and not among those found."""
+    least, few = base.explanation.log_posterior - settings.reach, len(base.explanation.hypothesis)
+    known = {key_of(entry.explanation.hypothesis) for entry in (base, *found)}
+    near = (e for e in ranked if len(e.hypothesis) <= few and e.log_posterior > least)
+    return [e for e in near if key_of(e.hypothesis) not in known][: settings.finalists]
+
+
+def _unvaried(entry: HeldOut, found: Sequence[HeldOut], settings: CoarseSettings) -> HeldOut | None:
+    """The same effects, fewer of them of a size that follows something, where they predict as well: then nothing says that it does."""
+    alike = (other for other in found if steadier(other.explanation, entry.explanation))
+    return min((o for o in alike if as_good(o, entry, settings)), key=lambda other: other.total, default=None)
+
+
+def _evened(entry: HeldOut, found: Sequence[HeldOut], explanations: Sequence[Explanation]) -> HeldOut:
+    """The same effects of one size, where sizes that may differ hardly do: an effect beside them may have been pruned."""
+    if not differs_in_vain(entry.explanation, explanations):
+        return entry
+    even = next(e for e in explanations if steadier(e, entry.explanation))
+    return held_out_as(bounded(even, found[0].explanation.settings.judgement.coarse.within), found)
+
+
+def _pruned(
+    entry: HeldOut, found: Sequence[HeldOut], known: Discrepancies, settings: CoarseSettings
+) -> HeldOut:
+    """An explanation without the effects that close nothing material beside the others."""
+    nothing = next(e for e in found if not e.explanation.hypothesis)
+    while entry.explanation.hypothesis:
+        smaller = [(i, without(entry.explanation, i)) for i in range(len(entry.explanation.hypothesis))]
+        if len(smaller) == 1:
+            smaller = [(0, nothing.explanation)]
+        closed = [known.closed(entry.explanation, rest, nothing.explanation) for _, rest in smaller]
+        least = int(np.argmin(closed))
+        if closed[least] >= settings.material or _accounts_for_it(
+            entry.explanation, smaller[least][1], known
+        ):
+            return entry
+        entry = held_out_as(smaller[least][1], found)
+    return entry
+
+
+def _accounts_for_it(explanation: Explanation, rest: Explanation, known: Discrepancies) -> bool:
+    """Whether an effect is likelier than not the cause of what the others leave, where that is more than a right model would.
+
+    What they leave may be small beside a large discrepancy and be an effect all the same: friction beside a gap. The rule is that of
+    `outside` at even odds: small things besides are no rarer than a further effect.
+    """
+    settings = explanation.settings
+    lacking, left = known.beside(explanation, rest)
+    if lacking <= settings.likelihood.error.crude:
+        return False
+    return outside(left, replace(settings.judgement.coarse, outside=0.5)) < 0.5
+
+
+def as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: float = 1.0) -> bool:
+    """Whether an explanation predicts as well as the best one: within a standard error, or what so few samples cannot tell."""
+    worse, error = entry.worse_than(best)
+    return entry is best or worse <= max(errors * error, settings.telling)
+
+
+def no_larger(explanation: Explanation, other: Explanation) -> bool:
+    """Whether an explanation has no more effects than another one, fewer numbers to bend, or takes no more to be described."""
+    own, theirs = explanation.hypothesis, other.hypothesis
+    few = len(own) <= len(theirs) or free_parameters(own) < free_parameters(theirs)
+    settings = explanation.settings.search
+    return few or complexity(own, settings=settings) <= complexity(theirs, settings=settings)
+
+
+def bounded(explanation: Explanation, within: float) -> Explanation:
+    """An explanation whose nominal parameters stay within so many stated standard deviations, fitted again where they do not.
+
+    So do those of whatever is made of it, without one of its effects, say: else a parameter would silently stand in for that.
+    """
+    parts = []
+    for problem, fitted in explanation.parts:
+        narrow, iterations = problem.bounded(within), explanation.settings.search.thorough
+        beyond = np.any(np.abs(fitted.vector[: problem.n_physical]) > within)
+        again = (
+            fit(narrow, fitted.hypothesis, start=fitted.vector, iterations=iterations) if beyond else fitted
+        )
+        parts.append((narrow, again))
+    return Explanation(tuple(parts))
+
+
+def without(explanation: Explanation, index: int) -> Explanation:
+    """An explanation without one of its effects, fitted again from where it was.
+
+    Args:
+        explanation: Fitted.
+        index: Of the effect in its hypothesis.
+    """
+    if index not in explanation.smaller:
+        explanation.smaller[index] = _without(explanation, index)
+    return explanation.smaller[index]
+
+
+def _without(explanation: Explanation, index: int) -> Explanation:
+    parts = []
+    for problem, fitted in explanation.parts:
+        if not 0 <= index < len(fitted.hypothesis):
+            parts.append((problem, fitted))
+            index -= len(fitted.hypothesis)
+            continue
+        _, etas = problem.split(fitted.hypothesis, fitted.vector)
+        rest = fitted.hypothesis[:index] + fitted.hypothesis[index + 1 :]
+        kept = np.concatenate([fitted.vector[: len(problem.nominal)], *etas[:index], *etas[index + 1 :]])
+        starts = np.array(
+            [kept, np.concatenate([np.zeros(len(problem.nominal)), *etas[:index], *etas[index + 1 :]])]
+        )
+        parts.append(
+            (problem, fit(problem, rest, start=starts, iterations=explanation.settings.search.thorough))
+        )
+        index = -1
+    return Explanation(tuple(parts))
+
+
+def held_out_as(explanation: Explanation, found: Sequence[HeldOut]) -> HeldOut:
+    """An explanation on held-out blocks, the finalist of the same effects where there is one."""
+    known = {key_of(e.explanation.hypothesis): e for e in found}
+    return known.get(key_of(explanation.hypothesis)) or held_out(explanation)
+
+
+def _log_prior(explanation: Explanation) -> float:
+    return log_prior_of(explanation.hypothesis, settings=explanation.settings.search)
