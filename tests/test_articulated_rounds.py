@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,13 +12,43 @@ from test_articulated import LIMIT, NOISE, mjcf, problem_of, write_case
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated import further_fits
+from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
 from bench.discrepancy.articulated_judgement.judgement import kept
+from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.misfit import Octaves, transformed
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import nominal_fit
+from bench.discrepancy.articulated_search.search import nominal_fit, search
+from bench.discrepancy.multibody.model import ArticulatedModel
+
+
+@pytest.mark.slow
+def test_a_number_that_no_judgement_believes_is_named_instead_of_what_it_hides(tmp_path):
+    """The shoulder's motor gives three quarters of what is stated, far less surely than 4 %; its friction is what gains most there."""
+    text = mjcf(servo=False, friction=LIMIT).replace('joint="shoulder"/>', 'joint="shoulder" gear="0.74"/>')
+    text = text.replace('frictionloss="0.0"', f'frictionloss="{3.0 * LIMIT}"')
+    folder = write_case(tmp_path, text, servo=False, velocity=True, offset=0.05)
+    document = json.loads((folder / "nominal.json").read_text())
+    document["parameters"]["gear:shoulder_drive"] = {"value": 1.0, "std": 0.04, "unit": "N m/(N m)"}
+    (folder / "nominal.json").write_text(json.dumps(document))
+    case, compiled, _ = admitted_robot(read_case(folder))
+    problem = TorqueProblem.of(case, ArticulatedModel.of(compiled), case.identification)
+    (gear,) = (i for i, p in enumerate(problem.nominal) if p.kind == "gear")
+
+    def misled(of, before, after):  # predictions are made with it no further out than is believed
+        return bool(abs(after.vector[gear]) > of.settings.articulated.judgement.strained)
+
+    asked = ("coulomb_friction", "position_offset", "force_gain_error")
+    candidates = [c for c in placements(problem, CATALOGUE) if c.effect.name in asked]
+    found = search(problem, candidates, misled=misled).fits[0]
+    assert not misled(problem, found, found)
+    etas = problem.etas(found.hypothesis, found.vector)
+    pairs = zip(found.hypothesis, etas, strict=True)
+    named = {placed.key: placed.effect.values(eta, placed.scales) for placed, eta in pairs}
+    assert named["force_gain_error", "shoulder_drive"]["relative_error"] == pytest.approx(-0.26, abs=0.03)
+    assert named["coulomb_friction", "elbow"]["limit"] == pytest.approx(LIMIT, rel=0.1)
 
 
 def octaves(n: float, samples: float) -> Octaves:
