@@ -52,7 +52,7 @@ class OutlierSettings:
     longest_dropout: int = 64
     steady: float = 0.2
     abrupt: float = 2.0
-    most: float = 5e-4
+    most: float = 1e-3
     fewest: int = 3
 
 
