@@ -15,6 +15,11 @@ MADE = {
         GRADED.format("second_", "second-laboratory"),
         "python scripts/second_laboratory.py out/second-laboratory",
     ),
+    "third_laboratory": (
+        "Cases of a third author, who knew nothing of the diagnosis: two-load joints, scheduled laws, faulty loggers",
+        GRADED.format("third_", "third-laboratory"),
+        "python scripts/third_laboratory.py out/third-laboratory",
+    ),
     "second_robots": (
         "Cases of a second author, who knew nothing of the diagnosis: robots",
         GRADED.format("ptz vee scar hop dsk gan", "second-robots/cases"),
