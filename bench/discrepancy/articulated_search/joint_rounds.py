@@ -30,25 +30,32 @@ def round_of(
     judged = problem.settings.articulated.judgement
     open_joints = {j for j, still in enumerate(quiet(current, judged)) if not still}
     open_joints |= strained(problem, current, settings.strained)
-    # behind an elastic drive the link is elsewhere, and all that hangs on it
-    shared = [c for c in candidates if len(problem.reached((c,))) > 1 or c.effect.train or not open_joints]
+    shared = [c for c in candidates if len(problem.reached((c,))) > 1 or not open_joints]
     own = {j: [c for c in candidates if c.joint == j and c not in shared] for j in sorted(open_joints)}
     rounds, parts = list[Round](), list[ArticulatedFit]()
     for j, mine in own.items():
         name = problem.joints[j].name
         if not problem.deadline.allows(f"effects at joint '{name}'"):
             break
-        told = best_of(
-            problem,
-            current,
-            grounds,
-            mine,
-            settings,
-            lambda text, name=name: progress(f"joint '{name}': {text}"),
-        )
-        rounds.append(told)
-        if told.best is not None and told.best.log_posterior >= current.log_posterior + settings.worth:
-            parts.append(told.best)
+        # behind an elastic drive the link is elsewhere, and all that hangs on it: what sits on it is fitted first
+        least, most = -np.inf, list[ArticulatedFit]()
+        for train in (False, True):
+            told = best_of(
+                problem,
+                current,
+                grounds,
+                [c for c in mine if c.effect.train == train],
+                settings,
+                lambda text, name=name: progress(f"joint '{name}': {text}"),
+                gained=max(0.0, 2.0 * (least + settings.sight - current.log_posterior)),
+                least=least,
+            )
+            rounds.append(told)
+            most += [told.best] if told.best is not None else []
+            least = max((f.log_posterior for f in most), default=-np.inf) - settings.sight
+        likeliest = max(most, key=lambda f: f.log_posterior, default=current)
+        if likeliest.log_posterior >= current.log_posterior + settings.worth:
+            parts.append(likeliest)
     fits = [f for told in rounds for f in told.fits]
     best = max((told.best for told in rounds if told.best), key=lambda f: f.log_posterior, default=None)
     if len(parts) > 1 and best is not None:
