@@ -10,7 +10,7 @@ from bench.arrays import Array
 from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, own_entries, refitted
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.rounds import Round, best_of, grounds_of, quiet, strained
+from bench.discrepancy.articulated_search.rounds import Grounds, Round, best_of, grounds_of, quiet, strained
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 
 
@@ -37,23 +37,13 @@ def round_of(
         name = problem.joints[j].name
         if not problem.deadline.allows(f"effects at joint '{name}'"):
             break
-        # behind an elastic drive the link is elsewhere, and all that hangs on it: what sits on it is fitted first
-        least, most = -np.inf, list[ArticulatedFit]()
-        for train in (False, True):
-            told = best_of(
-                problem,
-                current,
-                grounds,
-                [c for c in mine if c.effect.train == train],
-                settings,
-                lambda text, name=name: progress(f"joint '{name}': {text}"),
-                gained=max(0.0, 2.0 * (least + settings.sight - current.log_posterior)),
-                least=least,
-            )
-            rounds.append(told)
-            most += [told.best] if told.best is not None else []
-            least = max((f.log_posterior for f in most), default=-np.inf) - settings.sight
-        likeliest = max(most, key=lambda f: f.log_posterior, default=current)
+
+        def tell(text: str, name: str = name) -> None:
+            progress(f"joint '{name}': {text}")
+
+        told = _at_joint(problem, current, grounds, mine, settings, tell)
+        rounds += told
+        likeliest = max((r.best for r in told if r.best), key=lambda f: f.log_posterior, default=current)
         if likeliest.log_posterior >= current.log_posterior + settings.worth:
             parts.append(likeliest)
     fits = [f for told in rounds for f in told.fits]
@@ -82,6 +72,27 @@ def round_of(
     heard = [told.corrected for told in rounds if told.corrected is not None]
     corrected = max(heard, key=lambda one: one.best.log_posterior, default=None)
     return Round(best, fits, corrected)
+
+
+def _at_joint(
+    problem: ArticulatedProblem,
+    current: ArticulatedFit,
+    grounds: Grounds,
+    candidates: Sequence[PlacedOnJoint],
+    settings: SearchSettings,
+    progress: Callable[[str], None],
+) -> list[Round]:
+    """What may be missing at one joint: on it or in its drive, then an elastic drive behind which the link is elsewhere."""
+    first = best_of(
+        problem, current, grounds, [c for c in candidates if not c.effect.train], settings, progress
+    )
+    known = current.log_posterior if first.best is None else first.best.log_posterior
+    trains = [c for c in candidates if c.effect.train]
+    gained, least = 2.0 * (known - current.log_posterior), known - settings.sight
+    return [
+        first,
+        best_of(problem, current, grounds, trains, settings, progress, gained=max(gained, 0.0), least=least),
+    ]
 
 
 def _of_one_kind(
