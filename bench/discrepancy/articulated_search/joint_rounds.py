@@ -30,7 +30,8 @@ def round_of(
     judged = problem.settings.articulated.judgement
     open_joints = {j for j, still in enumerate(quiet(current, judged)) if not still}
     open_joints |= strained(problem, current, settings.strained)
-    shared = [c for c in candidates if len(problem.reached((c,))) > 1 or not open_joints]
+    # behind an elastic drive the link is elsewhere, and all that hangs on it
+    shared = [c for c in candidates if len(problem.reached((c,))) > 1 or c.effect.train or not open_joints]
     own = {j: [c for c in candidates if c.joint == j and c not in shared] for j in sorted(open_joints)}
     rounds, parts = list[Round](), list[ArticulatedFit]()
     for j, mine in own.items():
@@ -41,11 +42,10 @@ def round_of(
         def tell(text: str, name: str = name) -> None:
             progress(f"joint '{name}': {text}")
 
-        told = _at_joint(problem, current, grounds, mine, settings, tell)
-        rounds += told
-        likeliest = max((r.best for r in told if r.best), key=lambda f: f.log_posterior, default=current)
-        if likeliest.log_posterior >= current.log_posterior + settings.worth:
-            parts.append(likeliest)
+        told = best_of(problem, current, grounds, mine, settings, tell)
+        rounds.append(told)
+        if told.best is not None and told.best.log_posterior >= current.log_posterior + settings.worth:
+            parts.append(told.best)
     fits = [f for told in rounds for f in told.fits]
     best = max((told.best for told in rounds if told.best), key=lambda f: f.log_posterior, default=None)
     if len(parts) > 1 and best is not None:
@@ -63,6 +63,10 @@ def round_of(
         best = max(
             (f for f in (best, told.best) if f is not None), key=lambda f: f.log_posterior, default=None
         )
+    behind = _behind_a_train(problem, current, grounds, parts, candidates, settings)
+    if behind is not None:
+        fits.append(behind)
+        best = behind if best is None else max(best, behind, key=lambda f: f.log_posterior)
     kinds = list(_of_one_kind(problem, current, fits, own, settings))
     fits += [alike for alike, _ in kinds if alike not in fits]
     if kinds:
@@ -74,25 +78,29 @@ def round_of(
     return Round(best, fits, corrected)
 
 
-def _at_joint(
+def _behind_a_train(
     problem: ArticulatedProblem,
     current: ArticulatedFit,
     grounds: Grounds,
+    parts: Sequence[ArticulatedFit],
     candidates: Sequence[PlacedOnJoint],
     settings: SearchSettings,
-    progress: Callable[[str], None],
-) -> list[Round]:
-    """What may be missing at one joint: on it or in its drive, then an elastic drive behind which the link is elsewhere."""
-    first = best_of(
-        problem, current, grounds, [c for c in candidates if not c.effect.train], settings, progress
-    )
-    known = current.log_posterior if first.best is None else first.best.log_posterior
-    trains = [c for c in candidates if c.effect.train]
-    gained, least = 2.0 * (known - current.log_posterior), known - settings.sight
-    return [
-        first,
-        best_of(problem, current, grounds, trains, settings, progress, gained=max(gained, 0.0), least=least),
-    ]
+) -> ArticulatedFit | None:
+    """A fit with an elastic drive at the joint that gains most, and what the other joints miss beside it.
+
+    Where many joints miss something, an elastic drive alone is less than all of that, and yet more than what else may be at its joint. What
+    other joints seem to miss may be where its link is, though, and is nothing once that is known: each has to be worth naming still.
+    """
+    if len(parts) < 2 or not problem.deadline.allows("an elastic drive beside what other joints miss"):
+        return None
+    most, *others = sorted(parts, key=lambda part: -part.log_posterior)
+    trains = [c for c in candidates if c.effect.train and c.joint == most.hypothesis[-1].joint]
+    gained, least = 2.0 * (most.log_posterior - current.log_posterior), most.log_posterior - settings.sight
+    train = best_of(problem, current, grounds, trains, settings, lambda text: None, gained, least).best
+    if train is None or train.log_posterior < most.log_posterior:
+        return None
+    whole = _joined(problem, current, [train, *others])
+    return whole if whole.log_posterior >= train.log_posterior + settings.worth * len(others) else None
 
 
 def _of_one_kind(
