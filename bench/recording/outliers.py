@@ -3,7 +3,7 @@
 A sample is predicted by the cubic through its two neighbours on either side. Where one channel is off by many times what is usual about
 it, and goes on as if nothing had been once a few samples are taken out, these were never measured. What several channels show at
 once, what happens over and over in a record (impacts, switching), and what does not heal (a step) belongs to the record. A channel
-that changes with every sample, jumps to one value, holds it and jumps back, was not read meanwhile, however often that happens.
+that changes with every sample, and jumps to a value that it holds, or jumps back from it, was not read meanwhile, however often.
 
 References:
     F. R. Hampel, J. Am. Stat. Assoc. 69 (1974) 383-393 (departures in units of the median of absolute ones).
@@ -33,8 +33,7 @@ class OutlierSettings:
         block: Samples over which what is usual is taken.
         longest: Successive samples that are taken out at most where they are no hold: what lasts longer may have been.
         longest_hold: The same of a hold.
-        longest_dropout: The same of a hold that a jump leads to and another leads back from; what is longer is no gap that neighbours tell
-            anything of.
+        longest_dropout: The same of a hold that a jump leads to, or away from; what is longer is no gap that neighbours tell anything of.
         steady: Part of the changes from sample to sample that may be none in a channel that has dropouts: one that is held between its
             samples, or has coarse steps, stands still as a rule.
         abrupt: Changes of the sample before by which a jump is one: what friction stops comes to rest by changes that get smaller.

@@ -13,7 +13,7 @@ import numpy as np
 
 from bench.discrepancy.articulated.against_model import suspicions
 from bench.discrepancy.articulated.against_mujoco import ComparisonSettings, left_out
-from bench.discrepancy.articulated.nominal_values import with_nominal_values, without_idle
+from bench.discrepancy.articulated.nominal_values import with_nominal_values
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.load_limits import clipped_case
 from bench.discrepancy.checks.nominal_values import value_notes
@@ -63,7 +63,6 @@ def admitted_robot(
         UnknownNameError: A channel or parameter names nothing in the model.
     """
     rig = rig_of(declared)
-    declared, idle = without_idle(declared)
     case, said = in_model_units(declared, rig)
     compiled = with_nominal_values(rig, case.parameters)
     case = bound(case, compiled)
@@ -82,7 +81,7 @@ def admitted_robot(
         raise ModelError(f"{apart}; --anyway diagnoses with the nominal model all the same")
     doubts = (*doubts, apart) if apart else doubts
     return AdmittedRobot(
-        case, compiled, (*said, *idle, *clipped, *value_notes(case, rig, settings=settings.model), *doubts)
+        case, compiled, (*said, *clipped, *value_notes(case, rig, settings=settings.model), *doubts)
     )
 
 

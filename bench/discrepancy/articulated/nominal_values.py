@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable
-from dataclasses import replace
 
 import mujoco
 
-from bench.discrepancy.case.case import Case, NominalParameter
-from bench.discrepancy.model.mjcf_file import idle_parts
+from bench.discrepancy.case.case import NominalParameter
 from bench.discrepancy.multibody.joints import body_name
 from bench.errors import UnknownNameError
 from bench.rig import Rig
@@ -18,18 +16,6 @@ from bench.rig.bodies import BODIES, set_body
 
 LOCAL = ("damping", "frictionloss", "armature", "stiffness")
 """Parameters of joints."""
-
-
-def without_idle(case: Case) -> tuple[Case, tuple[str, ...]]:
-    """A case without the parameters of joints that were held or are followed, which change nothing, and what is said of them."""
-    idle, kept, notes = idle_parts(case), list[NominalParameter](), list[str]()
-    for parameter in case.parameters:
-        kind, _, target = parameter.name.partition(":")
-        if target in idle and kind in (*LOCAL, *DRIVES):
-            notes.append(f"'{parameter.name}' changes nothing: its joint is {idle[target]}")
-        else:
-            kept.append(parameter)
-    return replace(case, parameters=tuple(kept)), tuple(notes)
 
 
 def with_nominal_values(rig: Rig, parameters: Iterable[NominalParameter]) -> mujoco.MjModel:

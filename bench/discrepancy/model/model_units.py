@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
-from bench.discrepancy.case.case import Case
+from bench.discrepancy.case.case import Case, NominalParameter
 from bench.discrepancy.case.mjcf_units import expected_units
 from bench.discrepancy.case.rig_units import in_coherent_units
 from bench.discrepancy.case.unit_conversion import conversion_of, converted
-from bench.discrepancy.model.mjcf_file import rig_of
+from bench.discrepancy.model.mjcf_file import idle_parts, rig_of
 from bench.rig import Rig
+from bench.rig.bodies import BODIES
 
 
 class DeclaredUnit(NamedTuple):
@@ -27,6 +29,8 @@ class DeclaredUnit(NamedTuple):
 def in_model_units(case: Case, rig: Rig | None = None) -> tuple[Case, tuple[str, ...]]:
     """A case in the units of its model, and what was converted, in words; one that is in them stays as it is.
 
+    Parameters of joints that were held or are followed change nothing in it, and are left out.
+
     Args:
         case: As read.
         rig: Its own MJCF, where it was read before.
@@ -37,7 +41,21 @@ def in_model_units(case: Case, rig: Rig | None = None) -> tuple[Case, tuple[str,
     """
     if not case.rig.endswith(".xml"):
         return in_coherent_units(case)
-    return converted(case, *expected_units(case, rig or rig_of(case)))
+    case, idle = _without_idle(case)
+    own, said = converted(case, *expected_units(case, rig or rig_of(case)))
+    return own, (*said, *idle)
+
+
+def _without_idle(case: Case) -> tuple[Case, tuple[str, ...]]:
+    """A case without the parameters of joints that were held or are followed, which change nothing, and what is said of them."""
+    idle, kept, notes = idle_parts(case), list[NominalParameter](), list[str]()
+    for parameter in case.parameters:
+        kind, _, target = parameter.name.partition(":")
+        if target in idle and kind not in BODIES:
+            notes.append(f"'{parameter.name}' changes nothing: its joint is {idle[target]}")
+        else:
+            kept.append(parameter)
+    return replace(case, parameters=tuple(kept)), tuple(notes)
 
 
 def declared_units(case: Case) -> dict[str, DeclaredUnit]:
