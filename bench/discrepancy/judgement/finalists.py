@@ -40,6 +40,7 @@ def finalists(
         base = min((e for e in (base, *found) if 0 < len(e.explanation.hypothesis) <= few), key=_surprise)
     base = _evened(base, found, explanations)
     base = _unvaried(base, found, settings) or base
+    found += _not_told_apart(base, told, found, known)
     found = [own for own in found if own is base or _unvaried(own, found, settings) is None]
     # what is larger than what is material has been weighed already
     return [base, *(e for e in found if e is not base and no_larger(e.explanation, base.explanation))]
@@ -58,6 +59,32 @@ def _in_reach(
     known = {key_of(entry.explanation.hypothesis) for entry in (base, *found)}
     near = (e for e in ranked if len(e.hypothesis) <= few and e.log_posterior > least)
     return [e for e in near if key_of(e.hypothesis) not in known][: settings.finalists]
+
+
+def _not_told_apart(
+    base: HeldOut, told: Sequence[Explanation], found: Sequence[HeldOut], known: Discrepancies
+) -> list[HeldOut]:
+    """Explanations of as many effects out of reach, the likeliest first, until one that the blocks tell from the base, or that leaves
+    materially more.
+
+    A reach in log posterior is one of independent samples; where few blocks decide, what they leave open is wider. Of fewer effects
+    nothing is asked again: each of those of the base closes a material part.
+    """
+    judgement = base.explanation.settings.judgement
+    settings, few = judgement.coarse, len(base.explanation.hypothesis)
+    nothing = next(e.explanation for e in found if not e.explanation.hypothesis)
+    weighed, out = {key_of(entry.explanation.hypothesis) for entry in (base, *found)}, list[HeldOut]()
+    for e in told:
+        if not few or len(e.hypothesis) != few or key_of(e.hypothesis) in weighed:
+            continue
+        entry = held_out(bounded(e, settings.within))
+        more = known.closed(base.explanation, entry.explanation, nothing)
+        if more >= settings.material or not as_good(entry, base, settings, judgement.coarse_alike):
+            break
+        out.append(entry)
+        if len(out) == settings.finalists:
+            break
+    return out
 
 
 def _unvaried(entry: HeldOut, found: Sequence[HeldOut], settings: CoarseSettings) -> HeldOut | None:

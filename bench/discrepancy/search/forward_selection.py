@@ -107,13 +107,10 @@ def attribute(
         lengthen(search, size + 1, candidates)
         reduce_best(search)
     best = search.ranked()[0]
-    if not problem.scaled:
+    challenged = problem.scaled and near(best) and _worth_challenging(best, problem)
+    if not problem.scaled or (len(best.hypothesis) > 1 and not challenged):
         simplify(search, candidates)
-    elif (
-        near(best)
-        and _worth_challenging(best, problem)
-        and deadline.allows("rivals of what was found, from further starts")
-    ):
+    elif challenged and deadline.allows("rivals of what was found, from further starts"):
         progress(f"rivals of {names(best.hypothesis)}")
         challenge(search, screen, rounds=3 if problem.error is None else 1)
         _with_variants(search, len(search.ranked()[0].hypothesis))
