@@ -4,7 +4,8 @@ A case is "main" (one effect and a background), "unstated" (one effect and no st
 (nothing, no stated noise), by its class or by the background that its answer tells; "foreign beside" where the effect stands outside
 the catalogue. What counts as right:
 
-- main, unstated: the effect is named, or a set is declared that holds it; it closes the largest share; one other name at most; and
+- main, unstated: the effect is named, or a set is declared that holds it; it closes the largest share; one other name at most, and one
+  false name, for what the background holds may be named as well; and
   where there is a background whose noise is stated, what is named is not said to be complete.
 - foreign beside: unknown, or what is named is said not to be complete, or is it (`BY_ANOTHER_NAME`); nothing is named with certainty
   that does not shrink the discrepancy of the judging record.
@@ -188,6 +189,7 @@ def background_scored(answer: Mapping[str, Any], result: Mapping[str, Any]) -> I
         yield "and first", hit and (first == true or any(true in s for s in _sets(result)))
         yield "not none", result["verdict"] != "none"
         yield "one other name at most", len([name for name in said if name != true]) <= 1
+        yield "one false name at most", len([name for name in said if name not in right_names(answer)]) <= 1
         if kind == "main" and result["verdict"] == "effect" and _above_noise(answer):
             yield "not said to be complete", not result.get("complete")
         covered = _covered(answer["effects"][0], named)

@@ -108,8 +108,10 @@ def attribute(
         reduce_best(search)
     best = search.ranked()[0]
     challenged = problem.scaled and near(best) and _worth_challenging(best, problem)
-    if not problem.scaled or (len(best.hypothesis) > 1 and not challenged):
-        simplify(search, candidates)
+    if not problem.scaled:
+        simplify(search, candidates, settings.simplified)
+    elif len(best.hypothesis) > 1 and not challenged:
+        simplify(search, candidates, 1)
     elif challenged and deadline.allows("rivals of what was found, from further starts"):
         progress(f"rivals of {names(best.hypothesis)}")
         challenge(search, screen, rounds=3 if problem.error is None else 1)

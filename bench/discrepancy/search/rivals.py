@@ -102,7 +102,7 @@ def _of_one_number(effect: Effect) -> bool:
     return effect.site != "joint" and len(effect.parameters) == 1 and effect.parameters[0].signed
 
 
-def simplify(search: Search, candidates: Sequence[Placed]) -> None:
+def simplify(search: Search, candidates: Sequence[Placed], most: int) -> None:
     """Fit simpler relatives of the effects of the foremost hypotheses in their stead.
 
     Where nothing is down to the noise, whatever has most parameters comes foremost, and a law with one may never have been tried
@@ -111,9 +111,10 @@ def simplify(search: Search, candidates: Sequence[Placed]) -> None:
     Args:
         search: Fits so far; the new ones are added.
         candidates: Effects at their places.
+        most: How many hypotheses.
     """
     tasks: dict[frozenset, Task] = {}
-    for fitted in search.ranked()[: search.problem.settings.search.simplified]:
+    for fitted in search.ranked()[:most]:
         for i, placed in enumerate(fitted.hypothesis):
             rest, vector = _without(i, fitted, search.problem)
             for other in candidates:
