@@ -6,8 +6,9 @@ reach of the larger one is then weighed as well.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -28,19 +29,25 @@ def finalists(
     alone among them."""
     nothing = bounded(nominal_alone(explanations), settings.within)
     told = [e for e in explanations if e.hypothesis and not differs_in_vain(e, explanations)]
-    with_effects = told[: 2 * settings.finalists]
-    ranked = sorted((bounded(e, settings.within) for e in with_effects), key=lambda e: -e.log_posterior)
-    near = [e for e in ranked if e.log_posterior > ranked[0].log_posterior - settings.reach]
+    weighed, within = told[: 2 * settings.finalists], cache(lambda e: bounded(e, settings.within))
+    likeliest = -np.inf
+    for e in weighed:
+        if e.log_posterior > likeliest:
+            likeliest = max(likeliest, within(e).log_posterior)
+    near = _reached(weighed, likeliest - settings.reach, within)
     found = [held_out(e) for e in [*near[: settings.finalists], nothing]]
     best = min(found, key=_surprise)
     base = _pruned(best, found, known, settings)
     if base is not best and base.explanation.hypothesis:  # what was out of reach of more is not of less
-        found += [held_out(e) for e in _in_reach(base, ranked, found, settings)]
         few = len(base.explanation.hypothesis)
+        others = [e for e in _unlike(weighed, (base, *found)) if len(e.hypothesis) <= few]
+        near = _reached(others, base.explanation.log_posterior - settings.reach, within)
+        found += [held_out(e) for e in near[: settings.finalists]]
         base = min((e for e in (base, *found) if 0 < len(e.explanation.hypothesis) <= few), key=_surprise)
     base = _evened(base, found, explanations)
     base = _unvaried(base, found, settings) or base
-    found += _not_told_apart(base, told, found, known)
+    if base.explanation.hypothesis:
+        found += _not_told_apart(base, _unlike(told, (base, *found)), nothing, within, known)
     found = [own for own in found if own is base or _unvaried(own, found, settings) is None]
     # what is larger than what is material has been weighed already
     return [base, *(e for e in found if e is not base and no_larger(e.explanation, base.explanation))]
@@ -51,39 +58,46 @@ def _surprise(entry: HeldOut) -> float:
     return entry.total - 2.0 * _log_prior(entry.explanation)
 
 
-def _in_reach(
-    base: HeldOut, ranked: Sequence[Explanation], found: Sequence[HeldOut], settings: CoarseSettings
+def _reached(
+    explanations: Sequence[Explanation], least: float, within: Callable[[Explanation], Explanation]
 ) -> list[Explanation]:
-    """Explanations of no more effects than one that was pruned, near it, and not among those found."""
-    least, few = base.explanation.log_posterior - settings.reach, len(base.explanation.hypothesis)
-    known = {key_of(entry.explanation.hypothesis) for entry in (base, *found)}
-    near = (e for e in ranked if len(e.hypothesis) <= few and e.log_posterior > least)
-    return [e for e in near if key_of(e.hypothesis) not in known][: settings.finalists]
+    """Explanations that are likelier than a level within their bounds, the likeliest first.
+
+    No bound makes one likelier: what is below the level without is not fitted again.
+    """
+    found = [within(e) for e in explanations if e.log_posterior > least]
+    return sorted((e for e in found if e.log_posterior > least), key=lambda e: -e.log_posterior)
+
+
+def _unlike(explanations: Sequence[Explanation], found: Sequence[HeldOut]) -> list[Explanation]:
+    """Explanations that are not those of some effects at some places."""
+    known = {key_of(entry.explanation.hypothesis) for entry in found}
+    return [e for e in explanations if key_of(e.hypothesis) not in known]
 
 
 def _not_told_apart(
-    base: HeldOut, told: Sequence[Explanation], found: Sequence[HeldOut], known: Discrepancies
+    base: HeldOut,
+    others: Sequence[Explanation],
+    nothing: Explanation,
+    within: Callable[[Explanation], Explanation],
+    known: Discrepancies,
 ) -> list[HeldOut]:
-    """Explanations of as many effects out of reach, the likeliest first, until one that the blocks tell from the base, or that leaves
+    """Other explanations of as many effects, the likeliest first, until one that the blocks tell from the base, or that leaves
     materially more.
 
     A reach in log posterior is one of independent samples; where few blocks decide, what they leave open is wider. Of fewer effects
     nothing is asked again: each of those of the base closes a material part.
     """
-    judgement = base.explanation.settings.judgement
-    settings, few = judgement.coarse, len(base.explanation.hypothesis)
-    nothing = next(e.explanation for e in found if not e.explanation.hypothesis)
-    weighed, out = {key_of(entry.explanation.hypothesis) for entry in (base, *found)}, list[HeldOut]()
-    for e in told:
-        if not few or len(e.hypothesis) != few or key_of(e.hypothesis) in weighed:
+    judgement, out = base.explanation.settings.judgement, list[HeldOut]()
+    for e in others:
+        if len(e.hypothesis) != len(base.explanation.hypothesis):
             continue
-        entry = held_out(bounded(e, settings.within))
+        entry = held_out(within(e))
         more = known.closed(base.explanation, entry.explanation, nothing)
-        if more >= settings.material or not as_good(entry, base, settings, judgement.coarse_alike):
+        told = not as_good(entry, base, judgement.coarse, judgement.coarse_alike)
+        if told or more >= judgement.coarse.material or len(out) == judgement.coarse.finalists:
             break
         out.append(entry)
-        if len(out) == settings.finalists:
-            break
     return out
 
 
