@@ -14,9 +14,10 @@ from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.fits import Search
 from bench.discrepancy.fitting.goodness_of_fit import complexity, leaves_much
 from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.judgement import finalists as judgement_of_few
 from bench.discrepancy.judgement.coarse import Judged, judge
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
-from bench.discrepancy.judgement.finalists import bounded, no_larger, without
+from bench.discrepancy.judgement.finalists import bounded, finalists, no_larger, without
 from bench.discrepancy.likelihood.model_error import (
     ModelInadequacy,
     band_weights,
@@ -186,6 +187,39 @@ def test_an_effect_that_makes_the_judging_records_worse_goes():
     assert known.harm(explanations[0], rest) > 1.0 > known.harm(rest, explanations[1])
     named = judge(case, problem, explanations, np.random.default_rng(0)).chosen.explanation.hypothesis
     assert [p.effect.name for p in named] == ["quadratic_damping"]
+
+
+def test_what_few_blocks_leave_open_is_weighed_however_far_its_posterior_is_behind(monkeypatch):
+    case = planted_case(lambda f: motion_with(f, lambda x, v, z: (8e5 * x**3, [])), n=600)
+    problem = problem_of(case, crude_error(case, structure_of(case)))
+    settings = problem.settings.judgement.coarse
+    spring, gap, drag, nothing = (
+        explanation(problem, *names) for names in (("cubic_stiffness",), ("gap",), ("quadratic_damping",), ())
+    )
+    told = sorted((gap, drag), key=lambda e: -e.log_posterior)
+    assert told[0].log_posterior < spring.log_posterior - settings.reach
+    one_block, all_blocks = np.zeros(12), np.full(12, 10.0)
+    one_block[3] = 60.0
+    scores = {"cubic_stiffness": np.zeros(12), "nothing": np.full(12, 1e4)}
+
+    def predicted(e):
+        return HeldOut(e, scores[next((p.effect.name for p in e.hypothesis), "nothing")])
+
+    monkeypatch.setattr(judgement_of_few, "held_out", predicted)
+    monkeypatch.setattr(
+        Discrepancies, "closed", lambda self, e, rest, without: 0.0 if rest.hypothesis else 1.0
+    )
+
+    def weighed(nearer, farther):
+        for e, score in zip(told, (nearer, farther), strict=True):
+            scores[e.hypothesis[0].effect.name] = score
+        found = finalists([spring, *told, nothing], Discrepancies(case, problem), settings)
+        return [e.explanation.hypothesis[0].effect.name for e in found if e.explanation.hypothesis]
+
+    first, second = (e.hypothesis[0].effect.name for e in told)
+    assert weighed(one_block, all_blocks) == ["cubic_stiffness", first]
+    assert weighed(one_block, one_block) == ["cubic_stiffness", first, second]
+    assert weighed(all_blocks, one_block) == ["cubic_stiffness"]  # none beyond one that is told
 
 
 def test_what_accounts_for_all_that_another_effect_leaves_is_named_beside_it():

@@ -23,7 +23,7 @@ from bench.discrepancy.screening.linear_amplitudes import (
 )
 from bench.discrepancy.screening.screen import Screen
 from bench.discrepancy.search.forward_selection import prepare
-from bench.discrepancy.search.rivals import divide
+from bench.discrepancy.search.rivals import divide, simplify
 from bench.discrepancy.simulation.linear_response import linear_run
 from bench.discrepancy.simulation.stick_slip import NO_ELEMENTS, StructureMatrices, free_run
 
@@ -216,3 +216,23 @@ def test_two_plain_laws_are_fitted_in_the_place_of_one_with_a_curve_to_bend():
     assert pair.cost < best.cost
     # nothing else is asked for: a law of one parameter has no such stand-ins
     assert all("coulomb_friction" in {p.effect.name for p in f.hypothesis} for f in found.ranked(2))
+
+
+def test_a_relative_of_fewer_parameters_is_fitted_beside_what_else_is_missing():
+    case = planted_case(
+        lambda f: motion_with(f, lambda x, v, z: (1.5 * np.tanh(v / 1e-3) + 8.0 * v * abs(v), [])), n=1000
+    )
+    structure = structure_of(case)
+    problem = Problem(case, structure, case.identification)
+    names = ("stribeck_friction", "quadratic_damping", "coulomb_friction", "cubic_stiffness")
+    stribeck, drag, *others = candidates = placements(case, structure, [effect_named(name) for name in names])
+    found, _, _ = prepare(problem, candidates)
+    start = np.concatenate([np.zeros(len(problem.nominal)), stribeck.effect.grid()[0], drag.effect.grid()[0]])
+    converge(found, [((stribeck, drag), start)])
+    more = found.ranked()[0]
+    assert more.hypothesis == (stribeck, drag)
+    simplify(found, candidates, most=1)
+    plain = next(f for f in found.ranked(2) if others[0] in f.hypothesis)
+    assert {p.key for p in plain.hypothesis} == {others[0].key, drag.key}
+    assert plain.cost < more.cost + 0.5 * problem.settings.search.plain.parameters  # the curve gains nothing
+    assert not any(others[1] in f.hypothesis for f in found.ranked(2))  # a spring is no relative of friction
