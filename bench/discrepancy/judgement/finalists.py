@@ -89,13 +89,14 @@ def _not_told_apart(
     nothing is asked again: each of those of the base closes a material part.
     """
     judgement, out = base.explanation.settings.judgement, list[HeldOut]()
+    settings, errors = judgement.coarse, judgement.coarse_alike
     for e in others:
         if len(e.hypothesis) != len(base.explanation.hypothesis):
             continue
         entry = held_out(within(e))
         more = known.closed(base.explanation, entry.explanation, nothing)
-        told = not as_good(entry, base, judgement.coarse, judgement.coarse_alike)
-        if told or more >= judgement.coarse.material or len(out) == judgement.coarse.finalists:
+        told = not as_good(entry, base, settings, errors)
+        if told or more >= settings.material or len(out) == settings.finalists:
             break
         out.append(entry)
     return out
