@@ -14,7 +14,6 @@ from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.fitting.fits import Search
 from bench.discrepancy.fitting.goodness_of_fit import complexity, leaves_much
 from bench.discrepancy.fitting.map_fit import fit
-from bench.discrepancy.judgement import finalists as judgement_of_few
 from bench.discrepancy.judgement.coarse import Judged, judge
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
 from bench.discrepancy.judgement.finalists import bounded, finalists, no_larger, without
@@ -205,7 +204,7 @@ def test_what_few_blocks_leave_open_is_weighed_however_far_its_posterior_is_behi
     def predicted(e):
         return HeldOut(e, scores[next((p.effect.name for p in e.hypothesis), "nothing")])
 
-    monkeypatch.setattr(judgement_of_few, "held_out", predicted)
+    monkeypatch.setattr("bench.discrepancy.judgement.finalists.held_out", predicted)
     monkeypatch.setattr(
         Discrepancies, "closed", lambda self, e, rest, without: 0.0 if rest.hypothesis else 1.0
     )

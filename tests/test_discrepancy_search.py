@@ -193,15 +193,21 @@ def test_products_of_rounded_columns_are_summed_in_double_precision():
     np.testing.assert_allclose(found, rough.astype(np.float64).T @ other, rtol=1e-12)
 
 
-def test_two_plain_laws_are_fitted_in_the_place_of_one_with_a_curve_to_bend():
-    """Dry friction and drag together are a friction that first falls and then rises: Stribeck's may stand in for them."""
+def dry_with_drag(*names):
+    """Problem of a carriage that misses dry friction and quadratic drag, and effects at their places."""
     case = planted_case(
         lambda f: motion_with(f, lambda x, v, z: (1.5 * np.tanh(v / 1e-3) + 8.0 * v * abs(v), [])), n=1000
     )
     structure = structure_of(case)
     problem = Problem(case, structure, case.identification)
-    names = ("stribeck_friction", "coulomb_friction", "quadratic_damping", "cubic_stiffness")
-    candidates = placements(case, structure, [effect_named(name) for name in names])
+    return problem, placements(case, structure, [effect_named(name) for name in names])
+
+
+def test_two_plain_laws_are_fitted_in_the_place_of_one_with_a_curve_to_bend():
+    """Dry friction and drag together are a friction that first falls and then rises: Stribeck's may stand in for them."""
+    problem, candidates = dry_with_drag(
+        "stribeck_friction", "coulomb_friction", "quadratic_damping", "cubic_stiffness"
+    )
     found, screen, _ = prepare(problem, candidates)
     alone = [p for p in candidates if p.effect.name in ("stribeck_friction", "coulomb_friction")]
     converge(found, [((p,), np.append(np.zeros(len(problem.nominal)), p.effect.grid()[0])) for p in alone])
@@ -219,20 +225,14 @@ def test_two_plain_laws_are_fitted_in_the_place_of_one_with_a_curve_to_bend():
 
 
 def test_a_relative_of_fewer_parameters_is_fitted_beside_what_else_is_missing():
-    case = planted_case(
-        lambda f: motion_with(f, lambda x, v, z: (1.5 * np.tanh(v / 1e-3) + 8.0 * v * abs(v), [])), n=1000
+    problem, candidates = dry_with_drag(
+        "stribeck_friction", "quadratic_damping", "coulomb_friction", "cubic_stiffness"
     )
-    structure = structure_of(case)
-    problem = Problem(case, structure, case.identification)
-    names = ("stribeck_friction", "quadratic_damping", "coulomb_friction", "cubic_stiffness")
-    stribeck, drag, *others = candidates = placements(case, structure, [effect_named(name) for name in names])
+    stribeck, drag, dry, spring = candidates
     found, _, _ = prepare(problem, candidates)
     start = np.concatenate([np.zeros(len(problem.nominal)), stribeck.effect.grid()[0], drag.effect.grid()[0]])
     converge(found, [((stribeck, drag), start)])
-    more = found.ranked()[0]
-    assert more.hypothesis == (stribeck, drag)
+    assert found.ranked()[0].hypothesis == (stribeck, drag)
     simplify(found, candidates, most=1)
-    plain = next(f for f in found.ranked(2) if others[0] in f.hypothesis)
-    assert {p.key for p in plain.hypothesis} == {others[0].key, drag.key}
-    assert plain.cost < more.cost + 0.5 * problem.settings.search.plain.parameters  # the curve gains nothing
-    assert not any(others[1] in f.hypothesis for f in found.ranked(2))  # a spring is no relative of friction
+    assert {p.key for p in found.ranked()[0].hypothesis} == {dry.key, drag.key}  # the curve gains nothing
+    assert not any(spring in f.hypothesis for f in found.ranked(2))  # it is no relative of friction

@@ -5,8 +5,8 @@ A case is "main" (one effect and a background), "unstated" (one effect and no st
 the catalogue. What counts as right:
 
 - main, unstated: the effect is named, or a set is declared that holds it; it closes the largest share; one other name at most, and one
-  false name, for what the background holds may be named as well; and
-  where there is a background whose noise is stated, what is named is not said to be complete.
+  false name, for what the background holds is a right name; and where there is a background whose noise is stated, what is named is not
+  said to be complete.
 - foreign beside: unknown, or what is named is said not to be complete, or is it (`BY_ANOTHER_NAME`); nothing is named with certainty
   that does not shrink the discrepancy of the judging record.
 - background, clean: the same of certain names.

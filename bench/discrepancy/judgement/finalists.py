@@ -95,8 +95,8 @@ def _not_told_apart(
             continue
         entry = held_out(within(e))
         more = known.closed(base.explanation, entry.explanation, nothing)
-        told = not as_good(entry, base, settings, errors)
-        if told or more >= settings.material or len(out) == settings.finalists:
+        apart = not as_good(entry, base, settings, errors)
+        if apart or more >= settings.material or len(out) == settings.finalists:
             break
         out.append(entry)
     return out

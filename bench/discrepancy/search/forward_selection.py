@@ -110,7 +110,9 @@ def attribute(
     challenged = problem.scaled and near(best) and _worth_challenging(best, problem)
     if not problem.scaled:
         simplify(search, candidates, settings.simplified)
-    elif len(best.hypothesis) > 1 and not challenged:
+    elif (
+        not challenged and len(best.hypothesis) > 1 and deadline.allows("plainer relatives of what was found")
+    ):
         simplify(search, candidates, 1)
     elif challenged and deadline.allows("rivals of what was found, from further starts"):
         progress(f"rivals of {names(best.hypothesis)}")
