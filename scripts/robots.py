@@ -15,6 +15,7 @@ import json
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -95,14 +96,15 @@ class Row:
     further: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
 
 
-def row_of(name: str, data: Path) -> Row:
-    """Diagnose one robot."""
+def row_of(name: str, data: Path, progress: Callable[[str], None] = lambda text: None) -> Row:
+    """Diagnose one robot; `progress` is called with a line of text at every stage."""
     records = ROBOTS[name](data)
     began = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
         write_folder(records, Path(folder))
         try:
-            found = diagnose_articulated(read_case(folder), anyway=True, most=records.most)
+            case = read_case(folder)
+            found = diagnose_articulated(case, anyway=True, most=records.most, progress=progress)
         except BenchError as error:
             nan = float("nan")
             return Row(
@@ -155,13 +157,17 @@ def main(args: Args) -> None:
     for name in names:
         if name not in ROBOTS:
             raise UnknownNameError("robot", name, list(ROBOTS))
-    rows = []
+    aside, rows = Console(stderr=True), []
     for name in names:
+
+        def tell(text: str, name: str = name) -> None:
+            aside.print(f"{name}: {text}", markup=False, highlight=False)
+
         kept = args.out / f"{name}.json" if args.out else None
         if kept is not None and kept.is_file():
             rows.append(Row(**json.loads(kept.read_text())))
             continue
-        rows.append(row_of(name, args.data))
+        rows.append(row_of(name, args.data, tell))
         if kept is not None:
             write_text(kept, json.dumps(json_values(asdict(rows[-1])), indent=1))
     if args.picture is not None:

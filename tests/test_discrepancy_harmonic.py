@@ -111,6 +111,21 @@ def test_mains_hum_in_one_of_two_channels_is_the_sensor_s_and_no_force(channel, 
     assert verdict.gap.after < 1.3 * verdict.gap.noise_floor
 
 
+def unstated(case: Case) -> Case:
+    """A case of which nobody knows the noise."""
+    return replace(case, channels=tuple(replace(channel, noise_std=None) for channel in case.channels))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noises", [0.0, 20.0])
+def test_mains_hum_of_a_sensor_that_is_not_judged_is_named_where_no_noise_is_stated(noises):
+    """Weighed by what is left of it, a line is noise like another; no other channel tells of it, and the displacement is explained."""
+    case = humming(case_with(np.zeros(N), np.zeros(N)), "acceleration", noises * NOISE["acceleration"], 50.02)
+    verdict = diagnose(unstated(case)).verdict
+    assert [effect.name for effect in verdict.named] == (["acceleration_hum"] if noises else [])
+    assert verdict.verdict == ("effect" if noises else "none")
+
+
 @pytest.mark.slow
 def test_a_force_at_the_frequency_of_the_mains_is_one_where_two_channels_tell():
     verdict = diagnose(case_with(harmonic(30.0, 50.0, 0.8), harmonic(30.0, 50.0, -2.1))).verdict

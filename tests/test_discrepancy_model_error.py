@@ -7,7 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_cases import DAMPING, MASS, NOISE, STIFFNESS, linear_motion, motion_with, planted_case
+from planted_cases import (
+    DAMPING,
+    MASS,
+    NOISE,
+    SAMPLE_RATE,
+    STIFFNESS,
+    linear_motion,
+    motion_with,
+    planted_case,
+)
 
 from bench.discrepancy import diagnose
 from bench.discrepancy.effects.catalogue import effect_named
@@ -448,6 +457,27 @@ def test_noise_that_is_larger_than_stated_is_said_and_nothing_is_missing_for_it(
     said = [note for note in verdict.warnings if "larger than stated" in note]
     assert [note.split("'")[1] for note in said] == ["displacement", "acceleration"]
     assert "larger than stated" in verdict.explanation
+
+
+def jittering(force):
+    """Readings of a linear rig at instants that are off by a fifth of a sample (standard deviation)."""
+    clock = np.arange(len(force)) / SAMPLE_RATE
+    taken = clock + 0.2 / SAMPLE_RATE * np.random.default_rng(11).standard_normal(len(force))
+    return tuple(np.interp(taken, clock, own) for own in linear_motion(force))
+
+
+def test_what_grows_with_the_motion_and_is_no_force_is_no_effect_although_noise_is_stated():
+    """A clock that jitters leaves more where the motion is faster: no white noise, and less than sensors are calibrated to."""
+    verdict = diagnose(planted_case(jittering), catalogue=FEW).verdict
+    assert (verdict.verdict, verdict.named) == ("none", ())
+    assert "neither an effect of the catalogue nor a free force" in verdict.explanation
+    assert not verdict.complete
+    # as small a part of a motion that a force makes is one that a free force takes
+    quiet = {"force": 0.0, **{name: 0.1 * NOISE[name] for name in ("displacement", "acceleration")}}
+    softening = planted_case(lambda f: motion_with(f, lambda x, v, z: (-6e3 * x**3, [])), noise=quiet)
+    found = diagnose(softening, catalogue=[effect_named("displacement_delay")]).verdict
+    assert found.gap.parameters_only < 0.02
+    assert found.verdict == "unknown"
 
 
 def test_a_law_that_is_bent_to_what_no_catalogue_holds_is_not_named():

@@ -10,7 +10,15 @@ from bench.arrays import Array
 from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, own_entries, refitted
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.rounds import Grounds, Round, best_of, grounds_of, quiet, strained
+from bench.discrepancy.articulated_search.rounds import (
+    Grounds,
+    Round,
+    best_of,
+    freed,
+    grounds_of,
+    quiet,
+    strained,
+)
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 
 
@@ -46,28 +54,28 @@ def round_of(
         rounds.append(told)
         if told.best is not None and told.best.log_posterior >= current.log_posterior + settings.worth:
             parts.append(told.best)
-    fits = [f for told in rounds for f in told.fits]
-    best = max((told.best for told in rounds if told.best), key=lambda f: f.log_posterior, default=None)
-    if len(parts) > 1 and best is not None:
-        together = _joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))
-        fits.append(together)
-        best = max(best, together, key=lambda f: f.log_posterior)
+    joined = None
+    if len(parts) > 1:
+        joined = _joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))
+    rounds, best = _likeliest(problem, rounds, joined)
+    fits = [f for told in rounds for f in told.fits] + ([] if joined is None else [joined])
     if shared and problem.deadline.allows("effects that reach several joints"):
         gained = sum(part.log_posterior - current.log_posterior for part in parts)
         least = -np.inf if best is None else best.log_posterior - settings.sight
         told = best_of(
             problem, current, grounds, shared, settings, progress, gained=2.0 * gained, least=least
         )
+        told = freed(problem, told, least)
         rounds.append(told)
         fits += told.fits
         best = max(
             (f for f in (best, told.best) if f is not None), key=lambda f: f.log_posterior, default=None
         )
-    behind = _behind_a_train(problem, current, grounds, parts, candidates, settings)
+    behind = _behind_a_train(problem, current, grounds, parts, candidates, settings, progress)
     if behind is not None:
         fits.append(behind)
         best = behind if best is None else max(best, behind, key=lambda f: f.log_posterior)
-    kinds = list(_of_one_kind(problem, current, fits, own, settings))
+    kinds = list(_of_one_kind(problem, current, fits, own, settings, progress))
     fits += [alike for alike, _ in kinds if alike not in fits]
     if kinds:
         alike, worth = max(kinds, key=lambda kind: kind[0].log_posterior + kind[1])
@@ -78,6 +86,26 @@ def round_of(
     return Round(best, fits, corrected)
 
 
+def _likeliest(
+    problem: ArticulatedProblem, rounds: Sequence[Round], joined: ArticulatedFit | None
+) -> tuple[list[Round], ArticulatedFit | None]:
+    """The rounds of single joints, and the likeliest of their fits and of the one that joins them, all joints free.
+
+    What the other joints lose by a fit about one is known as a quadratic form: all joints are run for those that come first by it alone.
+    """
+    rounds, best = list(rounds), joined
+    waiting = {k: told.best.log_posterior for k, told in enumerate(rounds) if told.best is not None}
+    while waiting:
+        k = max(waiting, key=lambda k: waiting[k])
+        if best is not None and best.log_posterior >= waiting.pop(k):
+            break
+        rounds[k] = freed(problem, rounds[k])
+        found = rounds[k].best
+        if found is not None and (best is None or found.log_posterior > best.log_posterior):
+            best = found
+    return rounds, best
+
+
 def _behind_a_train(
     problem: ArticulatedProblem,
     current: ArticulatedFit,
@@ -85,6 +113,7 @@ def _behind_a_train(
     parts: Sequence[ArticulatedFit],
     candidates: Sequence[PlacedOnJoint],
     settings: SearchSettings,
+    progress: Callable[[str], None],
 ) -> ArticulatedFit | None:
     """A fit with an elastic drive at the joint that gains most, and what the other joints miss beside it.
 
@@ -96,7 +125,9 @@ def _behind_a_train(
     most, *others = sorted(parts, key=lambda part: -part.log_posterior)
     trains = [c for c in candidates if c.effect.train and c.joint == most.hypothesis[-1].joint]
     gained, least = 2.0 * (most.log_posterior - current.log_posterior), most.log_posterior - settings.sight
-    train = best_of(problem, current, grounds, trains, settings, lambda text: None, gained, least).best
+    progress(f"an elastic drive at joint '{problem.joints[most.hypothesis[-1].joint].name}'")
+    told = best_of(problem, current, grounds, trains, settings, lambda text: None, gained, least)
+    train = freed(problem, told, least).best
     if train is None or train.log_posterior < most.log_posterior:
         return None
     whole = _joined(problem, current, [train, *others])
@@ -109,6 +140,7 @@ def _of_one_kind(
     fits: Sequence[ArticulatedFit],
     own: Mapping[int, Sequence[PlacedOnJoint]],
     settings: SearchSettings,
+    progress: Callable[[str], None],
 ) -> Iterator[tuple[ArticulatedFit, float]]:
     """Fits with one kind of effect at all parts of a type, and what each has before a choice joint by joint.
 
@@ -131,6 +163,7 @@ def _of_one_kind(
             name: sum(f.log_posterior - current.log_posterior for f in found[name].values()) for name in whole
         }
         worth = sum(float(np.log(len(own[j]))) for j in joints[1:])
+        least = -np.inf
         for name in sorted(whole, key=lambda name: -gains[name])[: settings.finalists]:
             if not problem.deadline.allows("one kind of effect at all parts of a type"):
                 return
@@ -141,8 +174,11 @@ def _of_one_kind(
                     found[name].get(j) or ArticulatedFit.at(problem, *_begun(current, open_to[name, j]))
                     for j in joints
                 ]
-                made = [_joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))]
-            yield max(made, key=lambda f: f.log_posterior), worth
+                progress(f"{name} at all parts of a type")
+                made = [_joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior), least)]
+            alike = max(made, key=lambda f: f.log_posterior)
+            least = max(least, alike.log_posterior - settings.sight)
+            yield alike, worth
 
 
 def _begun(current: ArticulatedFit, placed: PlacedOnJoint) -> tuple[JointHypothesis, Array]:
@@ -152,9 +188,15 @@ def _begun(current: ArticulatedFit, placed: PlacedOnJoint) -> tuple[JointHypothe
 
 
 def _joined(
-    problem: ArticulatedProblem, current: ArticulatedFit, parts: Sequence[ArticulatedFit]
+    problem: ArticulatedProblem,
+    current: ArticulatedFit,
+    parts: Sequence[ArticulatedFit],
+    least: float = -np.inf,
 ) -> ArticulatedFit:
-    """A fit with the last effects of several, each about a joint of its own, on top of what they have in common."""
+    """A fit with the last effects of several, each about a joint of its own, on top of what they have in common.
+
+    Short of a log posterior of `least` it is fitted once (`refitted`).
+    """
     vector, last = parts[0].vector[: problem.size(current.hypothesis)].copy(), list[Array]()
     for part in parts:
         (j,) = problem.reached(part.hypothesis[-1:])
@@ -164,4 +206,5 @@ def _joined(
     hypothesis = (*current.hypothesis, *(part.hypothesis[-1] for part in parts))
     vector = np.concatenate([vector, *last])
     settled = problem.settled(hypothesis, vector)
-    return refitted(settled, hypothesis, vector, scale=ArticulatedFit.at(settled, hypothesis, vector).scale)
+    scale = ArticulatedFit.at(settled, hypothesis, vector).scale
+    return refitted(settled, hypothesis, vector, scale=scale, least=least)

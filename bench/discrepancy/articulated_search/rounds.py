@@ -18,6 +18,7 @@ from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, Pl
 from bench.discrepancy.articulated_search.containing import begun_again
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others, fit, own_entries, refitted
 from bench.discrepancy.articulated_search.misfit import log_likelihood
+from bench.discrepancy.articulated_search.periods import beside
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
 from bench.discrepancy.numerics.threads import in_threads
@@ -37,7 +38,7 @@ Grounds = list[tuple[ArticulatedProblem, ArticulatedFit]]
 
 
 class Round(NamedTuple):
-    """One effect more: the best, all joints free, all that were fitted as they are, and what was found where runs forget."""
+    """One effect more: the best, all that were fitted as they are, and what was found where runs forget."""
 
     best: ArticulatedFit | None
     fits: list[ArticulatedFit]
@@ -100,10 +101,10 @@ def best_of(
             soft, ground, settings.strained
         ):  # what stands in for the missing hides it; also from what was stated
             points += screen(soft, _untouched(soft, ground), candidates)
-        progress("fits")
         # where runs forget, other log posteriors hold
         short_of = least if soft is problem else -np.inf
-        first = _fits(soft, ground, by_effect(points, settings.starts), settings, gained, short_of)
+        told = by_effect(points, settings.starts)
+        first = _fits(soft, ground, told, settings, progress, gained, short_of)
     first = [f for f in first if sound(problem, f)] or first
     finalists = sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]
     if grounds[-1][0] is not problem:
@@ -112,10 +113,23 @@ def best_of(
     fits = in_threads(lambda f: _where_settled(problem, f), [f for f in finalists if sound(problem, f)])
     if not fits:
         return Round(None, fits, corrected)
-    best = _simplest(problem, fits)
+    return Round(_simplest(problem, fits), fits, corrected)
+
+
+def freed(problem: ArticulatedProblem, told: Round, least: float = -np.inf) -> Round:
+    """A round whose best is fitted once more, all joints free and about the postures that it has.
+
+    Args:
+        problem: Records and priors.
+        told: The round.
+        least: Log posterior short of which it is fitted once (`refitted`).
+    """
+    if told.best is None:
+        return told
+    best = told.best
     settled = problem.settled(best.hypothesis, best.vector)
     whole = refitted(settled, best.hypothesis, best.vector, scale=best.scale, least=least)
-    return Round(whole, [*(f for f in fits if f is not best), whole], corrected)
+    return told._replace(best=whole, fits=[*(f for f in told.fits if f is not best), whole])
 
 
 def _simplest(problem: ArticulatedProblem, fits: Sequence[ArticulatedFit]) -> ArticulatedFit:
@@ -159,12 +173,22 @@ def parted(
 
 def strained(problem: ArticulatedProblem, base: ArticulatedFit, beyond: float) -> set[int]:
     """Joints one of whose nominal parameters a fit has moved beyond some of its stated standard uncertainties."""
-    carriers = {joint.body: j for j, joint in enumerate(problem.joints)}
     out: set[int] = set()
-    for entry, moved in zip(problem.nominal, base.vector, strict=False):
-        if abs(moved) > beyond:
-            out |= {carriers[entry.target]} if entry.target in carriers else set(entry.joints)
+    for k in np.flatnonzero(np.abs(base.vector[: len(problem.nominal)]) > beyond):
+        out |= _at(problem, int(k))
     return out
+
+
+def _at(problem: ArticulatedProblem, k: int) -> set[int]:
+    """Joints of a nominal parameter: the one that carries its body, or those that it is about."""
+    entry, carriers = problem.nominal[k], {joint.body: j for j, joint in enumerate(problem.joints)}
+    return {carriers[entry.target]} if entry.target in carriers else set(entry.joints)
+
+
+def _far_out(problem: ArticulatedProblem, base: ArticulatedFit, joint: int) -> float:
+    """Squared deviations, in stated standard uncertainties, of the nominal parameters of a joint, summed."""
+    mine = [k for k in range(len(problem.nominal)) if joint in _at(problem, k)]
+    return float(np.sum(base.vector[mine] ** 2))
 
 
 def _untouched(problem: ArticulatedProblem, base: ArticulatedFit) -> ArticulatedFit:
@@ -220,43 +244,6 @@ def _again(
     )
 
 
-def _beside(
-    problem: ArticulatedProblem, found: ArticulatedFit, others: Others, settings: SearchSettings
-) -> ArticulatedFit:
-    """A fit whose last effect is periodic, with the next whole numbers of periods in a turn for as long as they are likelier.
-
-    Over the range of a joint two neighbouring numbers differ by a fraction of a period, which a phase and a wrong gain of the encoder make
-    up for; screened one at a time, with what else is missing still in the residuals, they are hardly told apart.
-    """
-    names = [p.name for p in found.hypothesis[-1].effect.parameters]
-    if PERIODS not in names:
-        return found
-    placed, first = found.hypothesis[-1], len(found.vector) - len(names)
-    sine, cosine, at = (first + names.index(name) for name in ("sine", "cosine", PERIODS))
-    grid = placed.effect.parameters[names.index(PERIODS)].grid
-    while True:
-        starts = []
-        for n in (found.vector[at] + d for d in (-2, -1, 1, 2)):
-            if n in grid:
-                # the same torque in the middle of the range: A sin(n q + phase)
-                turn = (found.vector[at] - n) * placed.scales.middle
-                vector = found.vector.copy()
-                vector[sine] = found.vector[sine] * np.cos(turn) - found.vector[cosine] * np.sin(turn)
-                vector[cosine] = found.vector[sine] * np.sin(turn) + found.vector[cosine] * np.cos(turn)
-                vector[at] = n
-                starts.append(vector)
-        new = fit(
-            problem, found.hypothesis, np.array(starts), scale=found.scale, iterations=settings.iterations, others=others,
-        )  # fmt: skip
-        if new.log_posterior <= found.log_posterior + settings.rise:
-            return found
-        found = new
-
-
-PERIODS = "periods_per_turn"
-"""Whole number among the parameters of a periodic effect."""
-
-
 def sound(problem: ArticulatedProblem, found: ArticulatedFit) -> bool:
     """Whether a fit is finite, no parameter of its effects sits at a bound, and its effects do what they are called for."""
     settings = problem.settings.articulated
@@ -299,6 +286,7 @@ def _fits(
     base: ArticulatedFit,
     points: Sequence[Sequence[Screened]],
     settings: SearchSettings,
+    progress: Callable[[str], None],
     gained: float,
     least: float,
 ) -> list[ArticulatedFit]:
@@ -310,14 +298,18 @@ def _fits(
     for k, mine in enumerate(points):
         if out and not problem.deadline.allows("fits of effects that promise less"):
             break
-        hopeful = k < settings.fitted and mine[0].gain >= settings.hope * gained
+        placed, promised = mine[0].placed, mine[0].gain
+        hopeful = k < settings.fitted and promised >= settings.hope * gained
         if not (hopeful or k < settings.least):
-            # where a number of the model was moved too far, numbers that may be wrong instead are tried, whatever they promise
-            instead = mine[0].placed.effect.number and mine[0].placed.joint in moved
+            # where a number of the model was moved too far, numbers that may be wrong instead are tried: what one of them gains beyond
+            # its promise is that the other comes back
+            promised += _far_out(problem, base, placed.joint)
+            instead = placed.effect.number and placed.joint in moved and promised >= settings.hope * gained
             if not instead or swapped == settings.fitted:
                 continue
             swapped += 1
-        hypothesis: JointHypothesis = (*base.hypothesis, mine[0].placed)
+        progress(f"{placed.effect.name} ({placed.where})")
+        hypothesis: JointHypothesis = (*base.hypothesis, placed)
         # nominal parameters that stood in for what was missing are also tried where they were stated, and fitted from there:
         # a start of less misfit need not be the nearer one
         untouched = np.concatenate([np.zeros(len(problem.nominal)), base.vector[len(problem.nominal) :]])
@@ -336,7 +328,8 @@ def _fits(
         )
         new = max(tried, key=lambda f: f.log_posterior)
         new = refitted(problem, hypothesis, new.vector, scale=new.scale, others=others, least=least)
-        new = _beside(problem, new, others, settings)
+        least = max(least, new.log_posterior - settings.sight)
+        new = beside(problem, new, others, settings)
         out.append(new)
         gained = max(gained, 2.0 * (new.log_posterior - base.log_posterior))
     return begun_again(

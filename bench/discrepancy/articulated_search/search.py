@@ -21,6 +21,7 @@ from bench.discrepancy.articulated_search.placements import apart
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.rounds import (
     best_of,
+    freed,
     grounds_of,
     parted,
     quiet,
@@ -156,7 +157,7 @@ def _eased(
     if not instead or not problem.deadline.allows("wrong numbers in the place of nominal parameters"):
         return None
     grounds = grounds_of(problem, current, settings)
-    best = best_of(problem, current, grounds, instead, settings, lambda text: None).best
+    best = freed(problem, best_of(problem, current, grounds, instead, settings, lambda text: None)).best
     if best is None or best.log_posterior < current.log_posterior + settings.worth:
         return None
     return best if len(best.hypothesis) > len(current.hypothesis) else None

@@ -43,8 +43,9 @@ class Judged:
         within: Those within one standard error of the best.
         alike: Those that the blocks do not tell from the chosen one: two standard errors; and those that the judging records prefer.
         vetoed: Whether the judging records refused what the others would have named.
+        off: Whether the nominal model, its parameters re-estimated, is off by more than sensors are calibrated to.
         missing: Whether something is missing that no effect describes, although no noise is stated that would tell: the nominal model is
-            off by more than sensors are calibrated to, and an effect was vetoed, or what it leaves is larger than the errors of models.
+            off, and an effect was vetoed, or what it leaves is larger than the errors of models.
         doubts: Probability, by name and place of each chosen effect, that what it closes is not its own.
         settings: Thresholds.
         known: What explanations leave of the records.
@@ -56,6 +57,7 @@ class Judged:
     within: tuple[HeldOut, ...]
     alike: tuple[HeldOut, ...]
     vetoed: bool
+    off: bool
     missing: bool
     doubts: Mapping[tuple[str, str], float]
     settings: CoarseSettings
@@ -103,7 +105,9 @@ def judge(
         trusted: Whether the noise is stated, and nothing contradicts it: what is named has to close most of the discrepancy then.
     """
     judgement = problem.settings.judgement
-    settings, known = judgement.coarse, Discrepancies(case, problem)
+    likeliest = explanations[0].hypothesis
+    read = {placed.target for placed in likeliest if placed.effect.added is not None}
+    settings, known = judgement.coarse, Discrepancies(case, problem, read)
     found = finalists(explanations, known, settings)
     base, nothing = found[0], next(e for e in found if not e.explanation.hypothesis)
     within = alike = tuple(entry for entry in found if as_good(entry, base, settings))
@@ -135,6 +139,7 @@ def judge(
         within,
         alike,
         vetoed,
+        off,
         missing,
         _doubts(chosen.explanation, nothing.explanation, known),
         settings,

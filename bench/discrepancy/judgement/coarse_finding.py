@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.goodness_of_fit import consistent, names
-from bench.discrepancy.fitting.map_fit import fit
+from bench.discrepancy.fitting.map_fit import Fit, fit
 from bench.discrepancy.judgement import posterior as evidence
 from bench.discrepancy.judgement.coarse import Judged, judge, kinds_of
 from bench.discrepancy.judgement.finding import Finding
@@ -122,9 +122,11 @@ def coarse_finding(
     judged = judge(case, problem, explanations, rng, trusted=problem.noise_stated and not understated)
     chosen, nearest = judged.chosen.explanation, _nearest(judged)
     probabilities = _marginal(judged)
-    noise = not chosen.hypothesis and not judged.vetoed and _explained_by_noise(problem, factors)
+    untouched = not chosen.hypothesis and not judged.vetoed
+    noise = untouched and _explained_by_noise(problem, factors)
     understated = _larger_than_stated(factors, 1.0) if noise else understated
-    kind = "none" if noise else _kind(problem, judged)
+    right = untouched and not noise and _right_as_a_model_can_be(problem, judged)
+    kind = "none" if noise or right else _kind(problem, judged)
     doubted = kind == "effect" and deadline.allows("free forces in place of the laws")
     nothing = next(entry for entry in judged.found if not entry.explanation.hypothesis)
     rival = _rival(judged.known, chosen, nothing.explanation) if doubted else None
@@ -142,7 +144,11 @@ def coarse_finding(
         named=evidence.effects_of(chosen, probabilities, least) if kind == "effect" else (),
         ranking=tuple(Ranked(*key, p) for key, p in sorted(probabilities.items(), key=lambda item: -item[1])),
         indistinguishable=_sets(judged),
-        words=NOISE_ALONE if noise else _words(kind, judged, nearest, rival, stated=problem.noise_stated),
+        words=NOISE_ALONE
+        if noise
+        else RIGHT
+        if right
+        else _words(kind, judged, nearest, rival, stated=problem.noise_stated),
         rival=rival,
         nearest=evidence.effects_of(nearest, probabilities, least) if kind == "unknown" else (),
         closest=nearest if kind == "unknown" and nearest.hypothesis else None,
@@ -235,19 +241,50 @@ def _explained_by_noise(problem: Problem, factors: Mapping[str, float]) -> bool:
     """Whether the nominal model explains the records once the noise is as large as their spectra show nearly everywhere."""
     if not problem.noise_stated or not any(factor > 1.0 for factor in factors.values()):
         return False
+    louder, fitted = _with_louder_noise(problem, factors)
+    return consistent(fitted) and not lack_of_fit(louder, fitted).significant(0.0)
+
+
+def _right_as_a_model_can_be(problem: Problem, judged: Judged) -> bool:
+    """Whether the nominal model is off by no more than sensors are calibrated to, and by nothing of which a free force, told from noise
+    as large as what it leaves, would take a material part."""
+    if judged.off or not problem.noise_stated or problem.windowed:
+        return False
+    alone = judged.chosen.explanation
+    left = [
+        problem.responses_of(record) - np.column_stack([run[name] for name in problem.structure.channels])
+        for record in problem.records
+        for run in [alone.predict(record)]
+    ]
+    factors = np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)) / problem.noise
+    louder, fitted = _with_louder_noise(
+        problem, dict(zip(problem.structure.channels, factors.tolist(), strict=True))
+    )
+    lack = lack_of_fit(louder, fitted)
+    return lack.gain - lack.expected < judged.settings.material * fitted.chi2
+
+
+def _with_louder_noise(problem: Problem, factors: Mapping[str, float]) -> tuple[Problem, Fit]:
+    """A problem of the same records whose channels are noisier than stated by some factors, and the nominal model fitted to it."""
     channels = tuple(
         replace(c, noise_std=c.noise_std * factors.get(c.name, 1.0)) if c.noise_std else c
         for c in problem.case.channels
     )
     case = replace(problem.case, channels=channels)
     louder = Problem(case, problem.structure, case.identification, settings=problem.settings)
-    fitted = fit(louder, (), start=np.zeros(len(louder.nominal)), iterations=problem.settings.search.thorough)
-    return consistent(fitted) and not lack_of_fit(louder, fitted).significant(0.0)
+    start = np.zeros(len(louder.nominal))
+    return louder, fit(louder, (), start=start, iterations=problem.settings.search.thorough)
 
 
 NOISE_ALONE = (
     "Nothing is missing from the model: with its parameters re-estimated it leaves what looks like noise all over the spectrum, "
     "and that noise is larger than stated."
+)
+
+
+RIGHT = (
+    "Nothing is missing that the records could tell: the model with its parameters re-estimated leaves more than the stated noise, "
+    "but less than sensors are calibrated to, and neither an effect of the catalogue nor a free force predicts the records better."
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from functools import cached_property
 
 import numpy as np
@@ -19,18 +20,25 @@ from bench.discrepancy.search.explain import Explanation
 
 
 class Discrepancies:
-    """NRMSE of explanations, on the judged coordinate where the nominal model is farthest off; kept by explanation."""
+    """NRMSE of explanations, on the judged coordinate where the nominal model is farthest off; kept by explanation.
 
-    def __init__(self, case: Case, problem: Problem) -> None:
-        self.case, self.problem = case, problem
-        self._floor = noise_floors(problem, case.validation)
-        self._own_floor = noise_floors(problem, case.identification)
+    Args:
+        case: The case.
+        problem: Its problem on all degrees of freedom.
+        read: Channels that are judged besides: what is added to the reading of a sensor shows nowhere else.
+    """
+
+    def __init__(self, case: Case, problem: Problem, read: Collection[str] = ()) -> None:
+        self.case, self.problem, self.read = case, problem, read
+        self._floor = noise_floors(problem, case.validation, read)
+        self._own_floor = noise_floors(problem, case.identification, read)
         self._kept: dict[tuple[Explanation, bool], Array] = {}
 
     @cached_property
     def as_stated(self) -> Array:
         """NRMSE (n_coordinates,) of the nominal model with its parameters as stated, on the judging records."""
-        errors = errors_by_block(self.problem, self.case.validation, nominal_prediction(self.problem), 1)
+        stated = nominal_prediction(self.problem)
+        errors = errors_by_block(self.problem, self.case.validation, stated, 1, self.read)
         return np.minimum(np.sqrt(errors.sum(axis=1)), DIVERGED_GAP)
 
     def of(self, explanation: Explanation, *, judging: bool) -> Array:
@@ -43,7 +51,7 @@ class Discrepancies:
         if key not in self._kept:
             records = self.case.validation if judging else self.case.identification
             blocks = self.problem.settings.judgement.held_out.blocks
-            self._kept[key] = errors_by_block(self.problem, records, explanation.predict, blocks)
+            self._kept[key] = errors_by_block(self.problem, records, explanation.predict, blocks, self.read)
         return self._kept[key]
 
     def closed(self, explanation: Explanation, without: Explanation, nothing: Explanation) -> float:
@@ -67,12 +75,12 @@ class Discrepancies:
         """Whether an explanation leaves at most a part of the judging records' discrepancy, beyond noise, on some coordinate and no
         more than all of it on any.
 
-        The discrepancy is that of the nominal model, its parameters re-estimated or as stated: without what is missing, to re-estimate
-        them may make it worse.
+        What shrinks is the discrepancy of the nominal model, its parameters re-estimated or as stated: without what is missing, to
+        re-estimate them may make it worse, and where it does, that is no harm of what is named.
         """
         before, after = self._judged(nothing, explanation)
-        before = np.minimum(before, self.as_stated)
-        shrinks = self._beyond(after) <= part * self._beyond(_at_rest(before))
+        nearest = np.minimum(before, self.as_stated)
+        shrinks = self._beyond(after) <= part * self._beyond(_at_rest(nearest))
         return bool(np.any(shrinks) and self._harm(before, after, explanation) <= 1.0)
 
     def harm(self, explanation: Explanation, rest: Explanation) -> float:

@@ -8,7 +8,7 @@ Records that start in motion, and windows of records that would drift, begin at 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,11 +27,17 @@ DIVERGED_GAP = 1e3
 """Gap that stands for a simulation that diverged."""
 
 
-def coordinates(structure: Structure) -> list[tuple[str, tuple[tuple[str, float], ...]]]:
+def coordinates(
+    structure: Structure, besides: Collection[str] = ()
+) -> list[tuple[str, tuple[tuple[str, float], ...]]]:
     """Return the judged coordinates: name, and the channels with their signs.
 
     A place whose relative coordinate is the difference of two measured positions is judged by that difference;
     otherwise every channel of the lowest measured order is judged on its own.
+
+    Args:
+        structure: Of the rig.
+        besides: Channels that are judged on their own besides.
     """
     lowest = min((o.order for o in structure.observers), default=0)
     judged: list[tuple[str, tuple[tuple[str, float], ...]]] = []
@@ -46,7 +52,9 @@ def coordinates(structure: Structure) -> list[tuple[str, tuple[tuple[str, float]
         active = np.flatnonzero(place.rows[0])
         if all(int(i) in singles for i in active):
             judged.append((place.name, tuple((singles[int(i)], float(place.rows[0, i])) for i in active)))
-    return judged or [(o.channel, ((o.channel, 1.0),)) for o in structure.observers]
+    judged = judged or [(o.channel, ((o.channel, 1.0),)) for o in structure.observers]
+    known = {channels[0][0] for _, channels in judged if len(channels) == 1}
+    return judged + [(name, ((name, 1.0),)) for name in sorted(set(besides) - known)]
 
 
 def nrmse(measured: Array, simulated: Array) -> float:
@@ -110,7 +118,11 @@ def gaps(
 
 
 def errors_by_block(
-    problem: Problem, records: Sequence[CaseRecord], predict: Prediction, blocks: int
+    problem: Problem,
+    records: Sequence[CaseRecord],
+    predict: Prediction,
+    blocks: int,
+    besides: Collection[str] = (),
 ) -> Array:
     """Squared error (n_coordinates, n_records * blocks) of a prediction: what every block of some records adds to the square of the NRMSE.
 
@@ -119,10 +131,11 @@ def errors_by_block(
         records: What is predicted.
         predict: The prediction.
         blocks: Blocks of each record.
+        besides: As of `coordinates`.
     """
     runs = [predict(record) for record in records]
     out = []
-    for _, channels in coordinates(problem.structure):
+    for _, channels in coordinates(problem.structure, besides):
         measured = [_combine(record.values, channels) for record in records]
         errors = [_combine(run, channels) - own for run, own in zip(runs, measured, strict=True)]
         whole = np.concatenate(measured)
@@ -133,10 +146,10 @@ def errors_by_block(
     return np.where(np.isfinite(table), table, DIVERGED_GAP**2)
 
 
-def noise_floors(problem: Problem, records: Sequence[CaseRecord]) -> Array:
-    """NRMSE (n_coordinates,) that noise alone leaves of every judged coordinate of some records."""
+def noise_floors(problem: Problem, records: Sequence[CaseRecord], besides: Collection[str] = ()) -> Array:
+    """NRMSE (n_coordinates,) that noise alone leaves of every judged coordinate of some records, see `coordinates`."""
     found = []
-    for _, channels in coordinates(problem.structure):
+    for _, channels in coordinates(problem.structure, besides):
         whole = np.concatenate([_combine(record.values, channels) for record in records])
         found.append(noise_level(problem, channels, records) / max(float(np.std(whole)), 1e-300))
     return np.array(found)

@@ -83,6 +83,7 @@ def attribute(
     if tells_motion(nothing, problem):
         points = about(screen, nothing, explained=True).ranked()
         if not points or points[0].gain < settings.noticeable:
+            with_hum(search, _read_off(candidates))  # which no motion tells of
             return search
     teeth = cache(lambda: fine_cogging(problem))
     _single(search, screen, candidates, progress, deadline, teeth)

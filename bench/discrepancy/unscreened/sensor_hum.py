@@ -18,7 +18,7 @@ from bench.arrays import Array
 from bench.discrepancy.case.case import CaseRecord
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.effects.effect import Effect, Values
-from bench.discrepancy.effects.read_off import HUM
+from bench.discrepancy.effects.read_off import HARMONIC, HUM
 from bench.discrepancy.fitting.fits import Search, converge
 from bench.discrepancy.fitting.goodness_of_fit import consistent
 from bench.discrepancy.fitting.map_fit import Fit
@@ -39,7 +39,7 @@ from bench.discrepancy.unscreened.spectral_lines import (
 
 
 def with_hum(search: Search, names: set[str], size: int = 1) -> None:
-    """Fit hum in the channel where it takes most away, where a channel has any and nothing explains the records yet.
+    """Fit hum in the channel where it takes most away, where a channel has any and nothing but a force explains the records yet.
 
     Args:
         search: Fits so far; the new one is added.
@@ -47,9 +47,9 @@ def with_hum(search: Search, names: set[str], size: int = 1) -> None:
         size: Number of effects: it stands alone, or beside the best that are one fewer.
     """
     problem = search.problem
-    if consistent(search.ranked()[0]):
+    if _explained(search):
         return
-    base = search.ranked(size - 1)[0]
+    base = next(f for f in search.ranked(size - 1) if all(p.effect.name != HARMONIC for p in f.hypothesis))
     humming = {p.target for p in base.hypothesis if p.effect.added is not None}
     found = []
     for c, channel in enumerate(problem.structure.channels):
@@ -71,6 +71,16 @@ def with_hum(search: Search, names: set[str], size: int = 1) -> None:
     eta = [placed.effect.parameters[0].eta(line.amplitude, scales), placed.effect.parameters[1].mean]
     eta += [each.phase for each in own.values()]
     converge(search, [((*base.hypothesis, placed), np.concatenate([base.vector, eta]))])
+
+
+def _explained(search: Search) -> bool:
+    """Whether the best hypothesis explains the records, no line of their spectra among what it explains.
+
+    What is weighed by what is left of it is consistent by construction, lines and all; and where a force explains a line, a sensor may.
+    """
+    best = search.ranked()[0]
+    forced = any(placed.effect.name == HARMONIC for placed in best.hypothesis)
+    return consistent(best) and search.problem.error is None and not forced
 
 
 def _left(problem: Problem, base: Fit, record: CaseRecord) -> Array:
