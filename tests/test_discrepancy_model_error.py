@@ -459,6 +459,20 @@ def test_noise_that_is_larger_than_stated_is_said_and_nothing_is_missing_for_it(
     assert "larger than stated" in verdict.explanation
 
 
+def test_a_spring_far_outside_what_was_stated_is_named_beside_a_small_law_and_closes_what_it_closes():
+    """The spring's own parameter could go as far; what it is held against has the parameter where that is believed to be."""
+    softer = planted_case(
+        lambda f: motion_with(f, lambda x, v, z: (-0.2 * STIFFNESS * x + 9.0 * v * abs(v), []))
+    )
+    verdict = diagnose(softer, catalogue=[*FEW, effect_named("stiffness_error")]).verdict
+    assert [effect.name for effect in verdict.named] == ["stiffness_error", "quadratic_damping"]
+    assert all(effect.probability > 0.95 for effect in verdict.named)
+    assert verdict.named[0].closed > verdict.named[1].closed > 0.1
+    assert not verdict.indistinguishable
+    assert verdict.complete
+    assert all(abs(entry.shift_in_std) < 3.0 for entry in verdict.nominal)
+
+
 def jittering(force):
     """Readings of a linear rig at instants that are off by a fifth of a sample (standard deviation)."""
     clock = np.arange(len(force)) / SAMPLE_RATE

@@ -1,7 +1,7 @@
 """What each named effect closes of the discrepancy, whether that is all, and where the nominal parameters have gone.
 
-An effect closes the part of the judging records' discrepancy that comes back when it is taken out and everything else is fitted again,
-with an interval from blocks of these records, which chose nothing.
+An effect closes the part of the judging records' discrepancy that comes back when it is taken out and everything else is fitted again, the
+nominal parameters where they are believed to be, with an interval from blocks of these records, which chose nothing.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.fitting.goodness_of_fit import key_of
-from bench.discrepancy.judgement.finalists import without
+from bench.discrepancy.judgement.finalists import bounded, without
 from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.prediction.validation_discrepancy import part_closed
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
@@ -40,12 +40,13 @@ def with_closed(
         explanations: All of them.
         rng: For the bootstrap.
     """
-    best, nothing = explanations[0], nominal_alone(explanations)
+    within = explanations[0].settings.judgement.coarse.within
+    best, nothing = (bounded(e, within) for e in (explanations[0], nominal_alone(explanations)))
     known = {key_of(e.hypothesis): e for e in explanations}
     out = []
     for i, (effect, placed) in enumerate(zip(named, best.hypothesis, strict=True)):
         rest = known.get(key_of(tuple(p for p in best.hypothesis if p is not placed)))
-        rest = rest or (nothing if len(best.hypothesis) == 1 else without(best, i))
+        rest = bounded(rest, within) if rest else nothing if len(best.hypothesis) == 1 else without(best, i)
         part = part_closed(case, problem, nothing.predict, rest.predict, best.predict, rng)
         out.append(replace(effect, closed=part.share, closed_ci95=part.ci95))
     return tuple(sorted(out, key=lambda effect: -effect.closed))

@@ -167,6 +167,8 @@ def bounded(explanation: Explanation, within: float) -> Explanation:
 
     So do those of whatever is made of it, without one of its effects, say: else a parameter would silently stand in for that.
     """
+    if all(problem.within <= within for problem, _ in explanation.parts):
+        return explanation
     parts = []
     for problem, fitted in explanation.parts:
         narrow, iterations = problem.bounded(within), explanation.settings.search.thorough
@@ -176,6 +178,14 @@ def bounded(explanation: Explanation, within: float) -> Explanation:
         )
         parts.append((narrow, again))
     return Explanation(tuple(parts))
+
+
+def strained(explanation: Explanation, within: float) -> bool:
+    """Whether an explanation moves a nominal parameter by more than `within` of its stated standard deviations."""
+    return any(
+        bool(np.any(np.abs(fitted.vector[: problem.n_physical]) > within))
+        for problem, fitted in explanation.parts
+    )
 
 
 def without(explanation: Explanation, index: int) -> Explanation:

@@ -18,10 +18,9 @@ from bench.discrepancy.checks.initial_motion import with_starts_found
 from bench.discrepancy.effects.effect import Effect
 from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.judgement import posterior as evidence
-from bench.discrepancy.judgement.coarse_finding import (
-    coarse_explanations,
-    coarse_finding,
-)
+from bench.discrepancy.judgement.coarse_finding import coarse_finding
+from bench.discrepancy.judgement.coarse_search import coarse_explanations
+from bench.discrepancy.judgement.finalists import bounded, strained
 from bench.discrepancy.judgement.finding import Finding
 from bench.discrepancy.judgement.nonparametric_rival import Rival, likelier_force
 from bench.discrepancy.judgement.predictive_check import contradicted
@@ -30,7 +29,7 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.search.explain import explain
-from bench.discrepancy.search.explanation import Explanation
+from bench.discrepancy.search.explanation import Explanation, nothing_left_first, parsimonious
 from bench.discrepancy.search.load_interpolation import promising_readings
 from bench.discrepancy.search.varied_size import differs_in_vain
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
@@ -82,7 +81,7 @@ def found_of(case: Case, how: How, rng: np.random.Generator) -> tuple[Case, Find
     ).noise_stated:
         # half the time for either regime
         case, known = _explained(case, replace(how, deadline=how.deadline.part(0.5)))
-        sharp = _sharp(case, known, how, rng)
+        sharp = _sharp(case, believable(known), how, rng)
         outside = sharp.rival is not None and sharp.rival.explanation.consistent
         believed = sharp.kind != "unknown" and not strained(
             sharp.explanations[0], how.settings.judgement.coarse.within
@@ -97,12 +96,24 @@ def found_of(case: Case, how: How, rng: np.random.Generator) -> tuple[Case, Find
     return case, coarse_finding(case, problem, explanations, rng, how.deadline)
 
 
-def strained(explanation: Explanation, within: float) -> bool:
-    """Whether an explanation moves a nominal parameter by more than `within` of its stated standard deviations."""
-    return any(
-        bool(np.any(np.abs(fitted.vector[: problem.n_physical]) > within))
-        for problem, fitted in explanation.parts
-    )
+def believable(explanations: Sequence[Explanation]) -> list[Explanation]:
+    """Explanations whose nominal parameters stay where they are believed to be, the best first; those far behind as they are.
+
+    A parameter may go as far as the records ask while effects are searched. What would be named leaves it within its bounds, and so
+    does what that is held against: else no error of the parameter is ever better than the parameter in its place.
+    """
+    settings, best = explanations[0].settings, explanations[0]
+    within, reach = settings.judgement.coarse.within, settings.judgement.coarse.reach
+    found = [
+        bounded(e, within)
+        if strained(e, within) and (not e.hypothesis or e.log_posterior > best.log_posterior - reach)
+        else e
+        for e in explanations
+    ]
+    if all(now is before for now, before in zip(found, explanations, strict=True)):
+        return list(explanations)
+    found.sort(key=lambda e: -e.log_posterior)
+    return nothing_left_first(found) if best.scaled else parsimonious(found)
 
 
 def _sharp(case: Case, explanations: list[Explanation], how: How, rng: np.random.Generator) -> Finding:
