@@ -340,6 +340,7 @@ def test_a_family_is_as_likely_as_what_has_an_effect_of_it():
             found,
             False,
             False,
+            False,
             {},
             problem.settings.judgement.coarse,
             known,
@@ -484,7 +485,7 @@ def test_what_grows_with_the_motion_and_is_no_force_is_no_effect_although_noise_
     """A clock that jitters leaves more where the motion is faster: no white noise, and less than sensors are calibrated to."""
     verdict = diagnose(planted_case(jittering), catalogue=FEW).verdict
     assert (verdict.verdict, verdict.named) == ("none", ())
-    assert "neither an effect of the catalogue nor a free force" in verdict.explanation
+    assert "neither an effect of the catalogue nor a free force predicts" in verdict.explanation
     assert not verdict.complete
     # as small a part of a motion that a force makes is one that a free force takes
     quiet = {"force": 0.0, **{name: 0.1 * NOISE[name] for name in ("displacement", "acceleration")}}

@@ -97,7 +97,8 @@ def _likeliest(
     waiting = {k: told.best.log_posterior for k, told in enumerate(rounds) if told.best is not None}
     while waiting:
         k = max(waiting, key=lambda k: waiting[k])
-        if best is not None and best.log_posterior >= waiting.pop(k):
+        promised = waiting.pop(k)
+        if best is not None and best.log_posterior >= promised:
             break
         rounds[k] = freed(problem, rounds[k])
         found = rounds[k].best

@@ -48,12 +48,14 @@ def coarse_finding(
     untouched = not chosen.hypothesis and not judged.vetoed
     noise = untouched and _explained_by_noise(problem, factors)
     understated = _larger_than_stated(factors, 1.0) if noise else understated
-    right = untouched and not noise and _right_as_a_model_can_be(problem, judged)
+    right = untouched and not noise and _right_as_a_model_can_be(problem, judged, factors)
     kind = "none" if noise or right else _kind(problem, judged)
     doubted = kind == "effect" and deadline.allows("free forces in place of the laws")
     nothing = next(entry for entry in judged.found if not entry.explanation.hypothesis)
     rival = _rival(judged.known, chosen, nothing.explanation) if doubted else None
     kind = "unknown" if rival else kind
+    words = _words(kind, judged, nearest, rival, stated=problem.noise_stated)
+    words = NOISE_ALONE if noise else RIGHT if right else words
     least = problem.settings.likelihood.error.least  # the gains of sensors are known to no better
     first = judged.chosen if kind == "effect" else nothing
     rest = sorted(
@@ -67,11 +69,7 @@ def coarse_finding(
         named=evidence.effects_of(chosen, probabilities, least) if kind == "effect" else (),
         ranking=tuple(Ranked(*key, p) for key, p in sorted(probabilities.items(), key=lambda item: -item[1])),
         indistinguishable=_sets(judged),
-        words=NOISE_ALONE
-        if noise
-        else RIGHT
-        if right
-        else _words(kind, judged, nearest, rival, stated=problem.noise_stated),
+        words=words,
         rival=rival,
         nearest=evidence.effects_of(nearest, probabilities, least) if kind == "unknown" else (),
         closest=nearest if kind == "unknown" and nearest.hypothesis else None,
@@ -168,21 +166,22 @@ def _explained_by_noise(problem: Problem, factors: Mapping[str, float]) -> bool:
     return consistent(fitted) and not lack_of_fit(louder, fitted).significant(0.0)
 
 
-def _right_as_a_model_can_be(problem: Problem, judged: Judged) -> bool:
-    """Whether the nominal model is off by no more than sensors are calibrated to, and by nothing of which a free force, told from noise
-    as large as what it leaves, would take a material part."""
+def _right_as_a_model_can_be(problem: Problem, judged: Judged, factors: Mapping[str, float]) -> bool:
+    """Whether the nominal model is off by no more than sensors are calibrated to, most of that all over the spectrum of every channel, and
+    by nothing of which a free force, told from noise as large as what is left, would take a material part."""
     if judged.off or not problem.noise_stated or problem.windowed:
         return False
-    alone = judged.chosen.explanation
+    channels, alone = problem.structure.channels, judged.chosen.explanation
+    runs = [alone.predict(record) for record in problem.records]
     left = [
-        problem.responses_of(record) - np.column_stack([run[name] for name in problem.structure.channels])
-        for record in problem.records
-        for run in [alone.predict(record)]
+        problem.responses_of(record) - np.column_stack([run[name] for name in channels])
+        for record, run in zip(problem.records, runs, strict=True)
     ]
-    factors = np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)) / problem.noise
-    louder, fitted = _with_louder_noise(
-        problem, dict(zip(problem.structure.channels, factors.tolist(), strict=True))
-    )
+    whole = np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)) / problem.noise
+    everywhere = np.array([factors.get(name, 0.0) for name in channels])
+    if np.any(everywhere**2 < 0.5 * whole**2):
+        return False
+    louder, fitted = _with_louder_noise(problem, dict(zip(channels, whole.tolist(), strict=True)))
     lack = lack_of_fit(louder, fitted)
     return lack.gain - lack.expected < judged.settings.material * fitted.chi2
 
@@ -207,7 +206,8 @@ NOISE_ALONE = (
 
 RIGHT = (
     "Nothing is missing that the records could tell: the model with its parameters re-estimated leaves more than the stated noise, "
-    "but less than sensors are calibrated to, and neither an effect of the catalogue nor a free force predicts the records better."
+    "but less than sensors are calibrated to and most of it all over the spectrum, and neither an effect of the catalogue nor a free "
+    "force predicts the records better."
 )
 
 
