@@ -9,6 +9,7 @@ import pytest
 from planted_cases import NOISE, SAMPLE_RATE, linear_motion, load, planted_case
 
 from bench.discrepancy import Case, diagnose, record_from_arrays
+from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.unscreened.spectral_lines import lines_of
 from bench.laws import find_law
 
@@ -109,6 +110,26 @@ def test_mains_hum_in_one_of_two_channels_is_the_sensor_s_and_no_force(channel, 
     assert abs(found["amplitude"].value - noises * NOISE[channel]) < 5 * found["amplitude"].std
     assert found["frequency"].value == pytest.approx(50.02, abs=1e-3)
     assert verdict.gap.after < 1.3 * verdict.gap.noise_floor
+
+
+@pytest.mark.slow
+def test_where_a_force_explains_a_line_a_sensor_is_asked_as_well():
+    """Beside a wrong gain a faint line of the accelerometer shows late, and a force explains it to within the noise."""
+    case = case_with(np.zeros(N), np.zeros(N))
+
+    def wrong(record):
+        values = dict(record.values)
+        values["acceleration"] = 1.06 * values["acceleration"]
+        return record_from_arrays(record.name, TIME, values)
+
+    records = [tuple(map(wrong, part)) for part in (case.identification, case.validation)]
+    case = replace(case, identification=records[0], validation=records[1])
+    few = ("acceleration_gain_error", "acceleration_hum", "harmonic_force", "displacement_crosstalk")
+    verdict = diagnose(
+        humming(case, "acceleration", 1.2 * NOISE["acceleration"], 50.02),
+        catalogue=[effect_named(name) for name in few],
+    ).verdict
+    assert {effect.name for effect in verdict.named} == {"acceleration_gain_error", "acceleration_hum"}
 
 
 def unstated(case: Case) -> Case:
