@@ -179,7 +179,7 @@ def _right_as_a_model_can_be(problem: Problem, judged: Judged, factors: Mapping[
     ]
     whole = np.sqrt(np.mean(np.concatenate(left) ** 2, axis=0)) / problem.noise
     everywhere = np.array([factors.get(name, 0.0) for name in channels])
-    if np.any(everywhere**2 < 0.5 * whole**2):
+    if np.any(everywhere**2 < problem.settings.judgement.everywhere * whole**2):
         return False
     louder, fitted = _with_louder_noise(problem, dict(zip(channels, whole.tolist(), strict=True)))
     lack = lack_of_fit(louder, fitted)

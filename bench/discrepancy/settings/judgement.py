@@ -131,6 +131,11 @@ class JudgementSettings:
         "Part of a spectrum that may be quieter than the stated noise.",
         "A tenth of the bins scatters below.",
     )
+    everywhere: float = setting(
+        0.5,
+        "Part of the power of what a model leaves of a channel that lies all over its spectrum where that is noise.",
+        "Half of the power.",
+    )
     error_settled: float = setting(
         0.5,
         "Part of the power of an estimated error above which what an explanation leaves is as estimated.",
