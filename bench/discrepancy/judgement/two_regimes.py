@@ -29,7 +29,7 @@ from bench.discrepancy.likelihood.problem import Problem
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.search.explain import explain
-from bench.discrepancy.search.explanation import Explanation, nothing_left_first, parsimonious
+from bench.discrepancy.search.explanation import Explanation, nothing_left_first
 from bench.discrepancy.search.load_interpolation import promising_readings
 from bench.discrepancy.search.varied_size import differs_in_vain
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
@@ -102,18 +102,13 @@ def believable(explanations: Sequence[Explanation]) -> list[Explanation]:
     A parameter may go as far as the records ask while effects are searched. What would be named leaves it within its bounds, and so
     does what that is held against: else no error of the parameter is ever better than the parameter in its place.
     """
-    settings, best = explanations[0].settings, explanations[0]
-    within, reach = settings.judgement.coarse.within, settings.judgement.coarse.reach
-    found = [
-        bounded(e, within)
-        if strained(e, within) and (not e.hypothesis or e.log_posterior > best.log_posterior - reach)
-        else e
-        for e in explanations
-    ]
-    if all(now is before for now, before in zip(found, explanations, strict=True)):
+    settings, best = explanations[0].settings.judgement.coarse, explanations[0].log_posterior
+    near = (e for e in explanations if not e.hypothesis or e.log_posterior > best - settings.reach)
+    far_off = {e for e in near if strained(e, settings.within)}
+    if not far_off:
         return list(explanations)
-    found.sort(key=lambda e: -e.log_posterior)
-    return nothing_left_first(found) if best.scaled else parsimonious(found)
+    found = [bounded(e, settings.within) if e in far_off else e for e in explanations]
+    return nothing_left_first(sorted(found, key=lambda e: -e.log_posterior))
 
 
 def _sharp(case: Case, explanations: list[Explanation], how: How, rng: np.random.Generator) -> Finding:
