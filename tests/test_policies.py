@@ -532,6 +532,58 @@ def test_excite_by_a_policy_and_by_planning(tmp_path: Path, capsys: pytest.Captu
     assert max(share for entries in told["peaks"].values() for share in entries.values()) <= 1.0 + 1e-9
 
 
+BACKGROUND = """
+[[experiment.background]]
+law = "cubic_stiffness"
+joint = "carriage"
+parameter = "k3"
+deviation = 3e4
+"""
+
+
+@pytest.mark.slow
+def test_excite_designs_for_a_background_by_planning_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "asked.toml"
+    path.write_text(EXAMPLE.read_text() + BACKGROUND)
+    rest = ["--evaluations", "64", "--draws", "2", "-o", str(tmp_path / "e.csv"), "--force", "--json"]
+    told = {}
+    for name, method in (("planned", "planner"), ("open", "dopt"), ("unasked", "planner")):
+        assert main(["excite", str(EXAMPLE if name == "unasked" else path), "--method", method, *rest]) == 0
+        told[name] = json.loads(capsys.readouterr().out)["notes"]
+    assert "prior standard deviations over all backgrounds" in told["planned"][-1]
+    assert told["open"] == [
+        "[[experiment.background]] is left out of account by this method; --method planner designs for it"
+    ]
+    assert not any("background" in note for note in told["unasked"])
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        (("cubic_stiffness", "cubic_stifness"), "Did you mean 'cubic_stiffness'"),
+        (("k3", "k2"), "known: k3"),
+        (('"carriage"', '"cariage"'), "Did you mean 'carriage'"),
+        (("3e4", "-3e4"), "deviation"),
+    ],
+)
+def test_a_background_that_no_rig_has_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], changed: tuple[str, str], said: str
+) -> None:
+    path = tmp_path / "asked.toml"
+    path.write_text(EXAMPLE.read_text() + BACKGROUND.replace(*changed))
+    assert main(["excite", str(path), "-o", str(tmp_path / "e.csv")]) == 2
+    assert said in capsys.readouterr().err.replace("\n", " ")
+
+
+def test_a_background_beside_a_rival_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "asked.toml"
+    path.write_text(EXAMPLE.read_text() + BACKGROUND + RIVAL)
+    assert main(["excite", str(path), "-o", str(tmp_path / "e.csv")]) == 2
+    assert "it came with a rival" in capsys.readouterr().err
+
+
 RIVAL = """
 [experiment.rival]
 elements = [{ law = "cubic_stiffness", joints = ["carriage"], name = "cubic", parameters = { k3 = 3e5 } }]

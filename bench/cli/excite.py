@@ -29,6 +29,9 @@ CLOSED_LOOP = (
     "the force is shaped while measuring: this is what happens on the rig of the file. On a shaker, run it in closed loop "
     "(bench.excitation.Planner, find_policy); replayed open-loop on another rig it need not keep the limits"
 )
+NO_BACKGROUND = (
+    "[[experiment.background]] is left out of account by this method; --method planner designs for it"
+)
 
 
 @dataclass
@@ -109,8 +112,10 @@ class Excite:
         """What the method makes of what is asked, and what the reader must know of it."""
         from bench.excitation import Rivals, design
 
+        unused = [NO_BACKGROUND] if asked.background else []
         if self.method == "policy":
-            return _from_policy(asked, self.policy, rng)
+            made, notes = _from_policy(asked, self.policy, rng)
+            return made, [*notes, *unused]
         if self.method == "planner" and isinstance(asked.experiment.question, Rivals):
             show("planning", 0.0)
             return _from_rival_planner(asked, rng)
@@ -124,7 +129,7 @@ class Excite:
             progress=lambda n, merit: show(f"{n} signals, {merit:.2f} nat", n / self.evaluations),
         )
         if self.method != "planner":
-            return made, []
+            return made, unused
         show("planning", 1.0)
         return _from_planner(asked, made, rng)
 
@@ -208,12 +213,14 @@ def _from_planner(asked: Any, opening: Any, rng: Any) -> tuple[Any, list[str]]:
     from bench.excitation.methods import controls_from
 
     controls = controls_from(opening)
-    planner = Planner(asked.experiment.question, _station(asked, 1, len(controls)), controls)
+    station = _station(asked, 1, len(controls))
+    planner = Planner(asked.experiment.question, station, controls, background=asked.background)
     made, plans = _planned(asked, planner, rng)
+    over = " over all backgrounds" if asked.background else ""
     notes = [
         f"at {plan.time:g} s: "
         + ", ".join(f"{name} {value:.4g}" for name, value in plan.values.items())
-        + f"; expected error at the end {plan.predicted:.2g} prior standard deviations"
+        + f"; expected error at the end {plan.predicted:.2g} prior standard deviations{over}"
         for plan in plans
     ]
     return made, [CLOSED_LOOP, *notes]

@@ -18,6 +18,11 @@ noise = { displacement = 5e-4, velocity = 0.01 } # standard deviations of the me
 [experiment.uncertain]                           # optional: ranges; by default all of the elements' parameters, a factor two
 "gap.clearance" = [0.005, 0.03]
 "stiffness:carriage" = [200.0, 400.0]
+[[experiment.background]]                        # optional: small forces that no element holds, for the planner
+law = "cubic_stiffness"
+joint = "carriage"
+parameter = "k3"
+deviation = 3e3                                  # standard deviation about zero
 [experiment.rival]                               # optional: another explanation; the question is then which of the two holds
 elements = [{ law = "cubic_stiffness", joints = ["carriage"], name = "cubic", parameters = { k3 = 3e5 } }]
 uncertain = { "cubic.k3" = [5e4, 2e6] } # as above; ranges of the structure are shared
@@ -34,6 +39,7 @@ import numpy as np
 
 from bench.documents import checked
 from bench.errors import ParameterError, UnknownNameError
+from bench.excitation.background import BackgroundTerm, with_background
 from bench.excitation.experiment import Experiment
 from bench.excitation.limits import Limits
 from bench.excitation.methods import paired_experiment
@@ -68,12 +74,14 @@ class Request:
         experiment: What is asked, measured and allowed, on draws about that rig.
         duration: Duration [s].
         band: Frequencies [Hz].
+        background: Small forces that no hypothesis holds.
     """
 
     rig: Rig
     experiment: Experiment
     duration: float
     band: tuple[float, float]
+    background: tuple[BackgroundTerm, ...] = ()
 
 
 def request(
@@ -89,7 +97,7 @@ def request(
 
     Raises:
         DocumentError: An entry is not known, missing, of the wrong kind or out of range.
-        UnknownNameError: The rig has no such actuator, channel or parameter.
+        UnknownNameError: The rig has no such actuator, channel, parameter or joint, or the bench no such law.
         ParameterError: The rig has nothing that is uncertain, or the test has too many steps.
     """
     asked = table if isinstance(table, ExperimentEntry) else checked(ExperimentEntry, table)
@@ -121,7 +129,11 @@ def request(
     else:
         prior = RigPrior((described,))
         experiment = Experiment(prior, asked.noise, limits, prior.draws(draws, rng))
-    return Request(rig, experiment, asked.duration, asked.band)
+    background = tuple(BackgroundTerm(**term.model_dump()) for term in asked.background)
+    _ = with_background(
+        described, background
+    ).rig.built  # a law, parameter or joint that it has not is told here
+    return Request(rig, experiment, asked.duration, asked.band, background)
 
 
 def _rival(rig: Rig, entry: RivalEntry, ranges: Mapping[str, tuple[float, float]]) -> RigHypothesis:

@@ -64,6 +64,20 @@ class RivalEntry(Entry):
         return self
 
 
+class BackgroundEntry(Entry):
+    """A small force that may act besides what is asked for."""
+
+    entry_name = "a term of the background"
+    law: Name
+    """Name of a law that is linear in its parameter."""
+    joint: Name
+    """Joint on which it acts."""
+    parameter: Name
+    """The parameter."""
+    deviation: Positive
+    """Its standard deviation about zero, in the parameter's unit."""
+
+
 class ExperimentEntry(LimitsEntry):
     """What a test is to find out, may do and measures."""
 
@@ -78,11 +92,18 @@ class ExperimentEntry(LimitsEntry):
     """Ranges of what is unknown, as "gap.clearance" or "stiffness:carriage"; all of the elements' parameters by default."""
     rival: RivalEntry | None = None
     """Another explanation of the joint."""
+    background: Listed[BackgroundEntry] = ()
+    """Small forces that no hypothesis holds; a planner designs for what identification leaves where they act."""
 
     @model_validator(mode="after")
     def _numbers_ascend(self) -> ExperimentEntry:
         _check_band(self.band)
         _check_ranges(self.uncertain)
+        if self.background and self.rival is not None:
+            refuse(
+                "it came with a rival; a background where parameters are asked for, or a rival without one, is expected",
+                "background",
+            )
         return self
 
 
