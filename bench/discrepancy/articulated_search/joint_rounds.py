@@ -164,7 +164,6 @@ def _of_one_kind(
             name: sum(f.log_posterior - current.log_posterior for f in found[name].values()) for name in whole
         }
         worth = sum(float(np.log(len(own[j]))) for j in joints[1:])
-        least = -np.inf
         for name in sorted(whole, key=lambda name: -gains[name])[: settings.finalists]:
             if not problem.deadline.allows("one kind of effect at all parts of a type"):
                 return
@@ -176,10 +175,8 @@ def _of_one_kind(
                     for j in joints
                 ]
                 progress(f"{name} at all parts of a type")
-                made = [_joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior), least)]
-            alike = max(made, key=lambda f: f.log_posterior)
-            least = max(least, alike.log_posterior - settings.sight)
-            yield alike, worth
+                made = [_joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))]
+            yield max(made, key=lambda f: f.log_posterior), worth
 
 
 def _begun(current: ArticulatedFit, placed: PlacedOnJoint) -> tuple[JointHypothesis, Array]:
@@ -189,15 +186,9 @@ def _begun(current: ArticulatedFit, placed: PlacedOnJoint) -> tuple[JointHypothe
 
 
 def _joined(
-    problem: ArticulatedProblem,
-    current: ArticulatedFit,
-    parts: Sequence[ArticulatedFit],
-    least: float = -np.inf,
+    problem: ArticulatedProblem, current: ArticulatedFit, parts: Sequence[ArticulatedFit]
 ) -> ArticulatedFit:
-    """A fit with the last effects of several, each about a joint of its own, on top of what they have in common.
-
-    Short of a log posterior of `least` it is fitted once (`refitted`).
-    """
+    """A fit with the last effects of several, each about a joint of its own, on top of what they have in common."""
     vector, last = parts[0].vector[: problem.size(current.hypothesis)].copy(), list[Array]()
     for part in parts:
         (j,) = problem.reached(part.hypothesis[-1:])
@@ -208,4 +199,4 @@ def _joined(
     vector = np.concatenate([vector, *last])
     settled = problem.settled(hypothesis, vector)
     scale = ArticulatedFit.at(settled, hypothesis, vector).scale
-    return refitted(settled, hypothesis, vector, scale=scale, least=least)
+    return refitted(settled, hypothesis, vector, scale=scale)

@@ -326,9 +326,10 @@ def _fits(
             ),
             starts,
         )
-        new = max(tried, key=lambda f: f.log_posterior)
-        new = refitted(problem, hypothesis, new.vector, scale=new.scale, others=others, least=least)
-        least = max(least, new.log_posterior - settings.sight)
+        first = max(tried, key=lambda f: f.log_posterior)
+        new = refitted(problem, hypothesis, first.vector, scale=first.scale, others=others, least=least)
+        # fitted once is held against fitted once: refits gain most where what is missing is large
+        least = max(least, first.log_posterior - settings.sight)
         new = beside(problem, new, others, settings)
         out.append(new)
         gained = max(gained, 2.0 * (new.log_posterior - base.log_posterior))
