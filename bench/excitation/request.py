@@ -18,11 +18,11 @@ noise = { displacement = 5e-4, velocity = 0.01 } # standard deviations of the me
 [experiment.uncertain]                           # optional: ranges; by default all of the elements' parameters, a factor two
 "gap.clearance" = [0.005, 0.03]
 "stiffness:carriage" = [200.0, 400.0]
-[[experiment.background]]                        # optional: small forces that no element holds, for the planner
+[[experiment.background]]                        # optional, not beside a rival: small forces that no element holds
 law = "cubic_stiffness"
 joint = "carriage"
 parameter = "k3"
-deviation = 3e3                                  # standard deviation about zero
+deviation = 3e3                                  # standard deviation about zero, in the parameter's unit
 [experiment.rival]                               # optional: another explanation; the question is then which of the two holds
 elements = [{ law = "cubic_stiffness", joints = ["carriage"], name = "cubic", parameters = { k3 = 3e5 } }]
 uncertain = { "cubic.k3" = [5e4, 2e6] } # as above; ranges of the structure are shared
@@ -130,9 +130,8 @@ def request(
         prior = RigPrior((described,))
         experiment = Experiment(prior, asked.noise, limits, prior.draws(draws, rng))
     background = tuple(BackgroundTerm(**term.model_dump()) for term in asked.background)
-    _ = with_background(
-        described, background
-    ).rig.built  # a law, parameter or joint that it has not is told here
+    if background:  # a law, parameter or joint that there is not is told here
+        _ = with_background(described, background).rig.built
     return Request(rig, experiment, asked.duration, asked.band, background)
 
 
