@@ -6,10 +6,7 @@ They are held against each other on held-out rigs without and with a background.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from itertools import product
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +17,6 @@ from numpy.typing import NDArray
 from bench.excitation import Planner, Policy, RigPrior, estimate
 from bench.excitation.acting import ActingPolicy
 from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
-from bench.excitation.ensemble import available_threads
 from bench.excitation.stepping import Packed
 from envs.background import background_of
 from envs.setups import Setup
@@ -85,51 +81,36 @@ def contest(
         planner: Also the planner, and the one that designs for backgrounds.
         tell: Called with what is done.
     """
-    tell("designing")
-    opened = open_loop(setup, np.random.default_rng(HELD_OUT - 1))
-    one = partial(_seed_rows, setup, opened, dict(policies), rigs, planner)
-    rows = []
-    with ProcessPoolExecutor(available_threads(), mp_context=get_context("spawn")) as pool:
-        for seed, made in enumerate(pool.map(one, range(seeds))):
-            tell(f"{seed + 1} of {seeds} seeds")
-            rows += made
-    return rows
-
-
-def _seed_rows(
-    setup: Setup,
-    opened: dict[str, NDArray[np.float64]],
-    policies: dict[str, ActingPolicy],
-    rigs: int,
-    planner: bool,
-    seed: int,
-) -> list[dict[str, Any]]:
-    """The rows of a seed."""
     prior, station = setup.questions[0], setup.station()
     assert isinstance(prior, RigPrior)
+    tell("designing")
+    opened = open_loop(setup, np.random.default_rng(HELD_OUT - 1))
     sources: dict[str, Source] = {**opened, **policies}
     if planner:
         opening = opened["d_optimal"]
         sources["planner"] = Planner(prior, station, opening)
         sources["planner for backgrounds"] = Planner(prior, station, opening, background=background_of(setup))
     noise = np.array([station.noise[name] for name in station.channels])
-    rng, rows = np.random.default_rng(HELD_OUT + seed), []
-    for kind in kinds_of(setup, rigs, rng):
-        n = len(kind.coordinates)
-        for real in (False, True):
-            packed = kind.real.packed(np.concatenate([kind.coordinates, real * kind.background], axis=1))
-            disturbance = disturbances(station, n, rng)
-            for name, source in sources.items():
-                runs = _run(source, setup, packed, disturbance, seed)
-                off = estimate(kind.family, runs.records, noise).coordinates - kind.coordinates
-                rows += [
-                    {
-                        "method": name, "seed": seed, "kind": kind.family.hypothesis.name, "background": real,
-                        "error": float(np.sqrt(np.mean(off[i] ** 2))),
-                        "violations": int(runs.violations[i]), "windows": int(runs.windows[i]),
-                    }
-                    for i in range(n)
-                ]  # fmt: skip
+    rows = []
+    for seed in range(seeds):
+        rng = np.random.default_rng(HELD_OUT + seed)
+        for kind in kinds_of(setup, rigs, rng):
+            n = len(kind.coordinates)
+            for real in (False, True):
+                packed = kind.real.packed(np.concatenate([kind.coordinates, real * kind.background], axis=1))
+                disturbance = disturbances(station, n, rng)
+                for name, source in sources.items():
+                    tell(f"seed {seed}, {kind.family.hypothesis.name}: {name}")
+                    runs = _run(source, setup, packed, disturbance, seed)
+                    off = estimate(kind.family, runs.records, noise).coordinates - kind.coordinates
+                    rows += [
+                        {
+                            "method": name, "seed": seed, "kind": kind.family.hypothesis.name, "background": real,
+                            "error": float(np.sqrt(np.mean(off[i] ** 2))),
+                            "violations": int(runs.violations[i]), "windows": int(runs.windows[i]),
+                        }
+                        for i in range(n)
+                    ]  # fmt: skip
     return rows
 
 
