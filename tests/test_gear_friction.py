@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,12 @@ from test_articulated import problem_of
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_judgement.judgement import Judge
 from bench.discrepancy.articulated_search.containing import begun_again
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.placements import placements
-from bench.discrepancy.articulated_search.search import nominal_fit
+from bench.discrepancy.articulated_search.rounds import sound
+from bench.discrepancy.articulated_search.search import believable, nominal_fit
 from bench.discrepancy.multibody.joint_forces import SLOTS, Slot
 from bench.discrepancy.multibody.joint_torque import missing_torque
 
@@ -143,3 +146,43 @@ def test_a_law_is_never_less_likely_than_one_within_it(servo):
     assert again.log_posterior > simple.log_posterior
     # what contains nothing better stays
     assert begun_again(problem, [again, simple], lambda f, start: far)[0] is again
+
+
+def test_a_gear_out_of_which_less_comes_the_harder_it_is_driven_is_no_explanation(servo):
+    problem = problem_of(servo)
+    gear = next(p for p in placements(problem, CATALOGUE) if p.effect.name == "gear_friction")
+    assert gear.scales.limit == pytest.approx(STALL)
+    start = [p.mean for p in gear.effect.parameters]
+    names = [p.name for p in gear.effect.parameters]
+    values = gear.effect.values(np.array(start), gear.scales)
+    for part, whole in ((0.95, True), (1.05, False)):  # of what the last bit of drive adds, friction takes
+        growth = (part - values["mu_drive"]) / (2.0 * STALL)
+        eta = np.array(start)
+        eta[names.index("growth")] = gear.effect.parameters[-1].eta(growth, gear.scales)
+        found = ArticulatedFit.at(problem, (gear,), np.append(np.zeros(len(problem.nominal)), eta))
+        assert sound(problem, replace(found, log_posterior=0.0)) is whole
+
+
+def test_what_is_moved_together_is_held_back_together(servo):
+    problem = problem_of(servo)
+    most = problem.settings.articulated.judgement.strained
+    names = [entry.name for entry in problem.nominal]
+    mass, gain = names.index("mass:arm"), names.index("kp:drive")
+    vector = np.zeros(len(names))
+    vector[mass] = 2.0 * most
+    vector[gain] = (
+        2.0 * most * 0.02 / 0.05
+    )  # a servo as much stiffer holds an arm that much heavier where it was
+    far = ArticulatedFit.at(problem, (), vector)
+    clipped = ArticulatedFit.at(problem, (), np.clip(vector, -most, most))
+    near = believable(problem, far)
+    assert np.abs(near.vector).max() <= most
+    assert near.misfit.sum() < clipped.misfit.sum()
+    assert believable(problem, near) is near
+    judge = Judge(problem, problem)
+    floor = np.zeros(1)
+    assert judge.believed(far) is judge.believed(far)
+    np.testing.assert_array_equal(
+        judge.predict(far, floor).power, judge.predict(judge.believed(far), floor).power
+    )
+    assert judge.predict(far, floor).discrepancy[0] < judge.predict(clipped, floor).discrepancy[0]

@@ -16,7 +16,14 @@ from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.explaining import Question, explained
 from bench.discrepancy.articulated.naming import ranking_of
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
-from bench.discrepancy.articulated_judgement.judgement import alike, keys_of, noise_floor, predict, simplest
+from bench.discrepancy.articulated_judgement.judgement import (
+    Judge,
+    alike,
+    keys_of,
+    noise_floor,
+    predict,
+    simplest,
+)
 from bench.discrepancy.articulated_judgement.whiteness import astray
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.placements import placements
@@ -176,7 +183,7 @@ def test_explanations_that_predict_as_well_are_told_beside_what_is_named(tmp_pat
     settings = JudgementSettings()
     final = next(f for f in fits if f.hypothesis[0].effect.name == "coulomb_friction")
     predicted = predict(judging, final, noise_floor(judging, final, settings), settings)
-    found = alike(judging, fits, final, predicted, settings)
+    found = alike(Judge(problem, judging), fits, final, predicted)
     assert frozenset({("stribeck_friction", "pivot")}) in found
     assert frozenset({("force_offset", "pivot")}) not in found
     # what is as good counts as much, however much likelier the one is

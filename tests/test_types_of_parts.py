@@ -14,8 +14,15 @@ from test_articulated_rounds import rubbing
 from bench.discrepancy import read_case
 from bench.discrepancy.articulated.naming import model_numbers
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
+from bench.discrepancy.articulated_judgement.judgement import (
+    Judge,
+    keys_of,
+    ladder,
+    noise_floor,
+    predict,
+    simplest,
+)
 from bench.discrepancy.articulated_judgement.judgement import alike as alike_in
-from bench.discrepancy.articulated_judgement.judgement import keys_of, ladder, noise_floor, predict, simplest
 from bench.discrepancy.articulated_search.joint_rounds import round_of
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.search import nominal_fit, steps
@@ -174,7 +181,7 @@ def test_one_kind_of_effect_is_taken_at_all_parts_of_a_type(tmp_path):
     )
     judged = problem.settings.articulated.judgement
     floor = noise_floor(problem, told.best, judged)
-    near = alike_in(problem, fits, other, predict(problem, other, floor, judged), judged)
+    near = alike_in(Judge(problem, problem), fits, other, predict(problem, other, floor, judged))
     assert keys_of(told.best) in near
     assert simplest(fits, other, near).hypothesis == told.best.hypothesis
 

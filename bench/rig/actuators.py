@@ -65,6 +65,11 @@ class JointDrive:
         return self.gear**2 * self.kp if self.servo else 0.0
 
     @property
+    def strongest(self) -> float:
+        """Largest torque that it can give the joint, either way; infinite where nothing limits it."""
+        return abs(self.gear) * min(max(abs(self.low), abs(self.high)), self.stall)
+
+    @property
     def damping(self) -> float:
         """Damping that it gives the joint."""
         return self.gear**2 * self.kv

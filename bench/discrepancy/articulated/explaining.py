@@ -23,13 +23,13 @@ from bench.discrepancy.articulated.naming import left_of, verdict_of
 from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_judgement.judgement import (
     EffectKeys,
+    Judge,
     Kept,
     PredictedErrors,
     alike,
     better,
     kept,
     ladder,
-    noise_floor,
     predict,
     simplest,
     without_each,
@@ -116,35 +116,37 @@ def _explained(
 ) -> Explained:
     """Explain by runs, or by the torque of a `TorqueProblem`, whose explanations are never complete."""
     judged, rng = problem.settings.articulated.judgement, question.rng
-    judges = dict[float, ArticulatedProblem]()
+    judges, soft = dict[ArticulatedProblem, Judge](), dict[float, ArticulatedProblem]()
 
-    def judge(of: ArticulatedProblem) -> ArticulatedProblem:
-        if of.softness not in judges:
-            judges[of.softness] = asked_as(of, question.judging.softened(of.softness))
-        return judges[of.softness]
+    def judge_of(of: ArticulatedProblem) -> Judge:
+        if of.softness not in soft:
+            soft[of.softness] = asked_as(of, question.judging.softened(of.softness))
+        if of not in judges:
+            judges[of] = Judge(of, soft[of.softness])
+        return judges[of]
 
     def misled(of: ArticulatedProblem, before: ArticulatedFit, after: ArticulatedFit) -> bool:
         floor = np.zeros(len(of.joints))  # noise takes the same off both
-        then, now = (predict(judge(of), fit, floor, judged) for fit in (before, after))
+        then, now = (judge_of(of).predict(fit, floor) for fit in (before, after))
         return better(now, then, judged)
 
     problem, fits, given_up = search(
         problem, candidates, settings=question.settings, misled=misled, progress=question.progress
     )
-    judging, judged_by = question.judging.softened(problem.softness), judge(problem)
+    judging, judge = question.judging.softened(problem.softness), judge_of(problem)
     question.progress("judging records")
-    climbed = kept(problem, judged_by, fits, judged)
+    climbed = kept(judge, fits)
     for earlier in given_up:  # of what was likelier later, the judging records may bear out less
         if not problem.deadline.allows("whether what the search gave up predicts better"):
             break
-        other = kept(problem, judged_by, [earlier, *fits], judged)
+        other = kept(judge, [earlier, *fits])
         if better(climbed.predictions[climbed.last], other.predictions[other.last], judged):
             climbed = other
-    standing = _Standing(problem, judged_by, [*fits, *climbed.fits], climbed, stated=question.stated)
+    standing = _Standing(judge, [*fits, *climbed.fits], climbed, stated=question.stated)
     standing.settle(candidates)
     left, predicted = standing.left, standing.predicted
     verdict = verdict_of(
-        problem, standing.fits, standing.rungs, predict(judged_by, None, standing.floor, judged), standing.predictions,
+        problem, standing.fits, standing.rungs, judge.predict(None, standing.floor), standing.predictions,
         [None if rest is None else predicted(rest) for rest in without_each(standing.fits, standing.final)], judged, rng,
         whole=left.whole, left=left_of(problem, standing.final, left.coloured, left.astray), alike=standing.near,
     )  # fmt: skip
@@ -157,8 +159,7 @@ class _Standing:
     """The explanation that stands while what is named is settled: the last rung of a ladder, with what it predicts and what it leaves.
 
     Args:
-        problem: Records for identification.
-        judged_by: Records for judging.
+        judge: Records that chose nothing.
         fits: All fitted hypotheses, the likeliest first.
         climbed: What the judging records bear out.
         stated: Whether all noise is stated.
@@ -166,14 +167,13 @@ class _Standing:
 
     def __init__(
         self,
-        problem: ArticulatedProblem,
-        judged_by: ArticulatedProblem,
+        judge: Judge,
         fits: list[ArticulatedFit],
         climbed: Kept,
         *,
         stated: bool,
     ) -> None:
-        self.problem, self.judged_by, self.fits, self.stated = problem, judged_by, fits, stated
+        self.judge, self.problem, self.fits, self.stated = judge, judge.problem, fits, stated
         self.floor = climbed.predictions[0].floor
         self.rungs = climbed.rungs[: climbed.last + 1]
         self.predictions = climbed.predictions[: len(self.rungs)]
@@ -189,8 +189,7 @@ class _Standing:
     def predicted(self, found: ArticulatedFit) -> PredictedErrors:
         """What a fit predicts of the judging records."""
         if found not in self._known:
-            judged = self.problem.settings.articulated.judgement
-            self._known[found] = predict(self.judged_by, found, self.floor, judged)
+            self._known[found] = self.judge.predict(found, self.floor)
         return self._known[found]
 
     def settle(self, candidates: Sequence[PlacedOnJoint]) -> None:
@@ -217,11 +216,10 @@ class _Standing:
         self.left = self._left()
 
     def _alike(self) -> set[EffectKeys]:
-        judged = self.problem.settings.articulated.judgement
-        return alike(self.judged_by, self.fits, self.final, self.predictions[-1], judged)
+        return alike(self.judge, self.fits, self.final, self.predictions[-1])
 
     def _left(self) -> _Left:
-        return _left(self.problem, self.judged_by, self.final, self.predictions[-1], stated=self.stated)
+        return _left(self.judge, self.final, self.predictions[-1], stated=self.stated)
 
 
 class _Left(NamedTuple):
@@ -232,18 +230,12 @@ class _Left(NamedTuple):
     whole: bool
 
 
-def _left(
-    problem: ArticulatedProblem,
-    judging: ArticulatedProblem,
-    final: ArticulatedFit,
-    predicted: PredictedErrors,
-    *,
-    stated: bool,
-) -> _Left:
+def _left(judge: Judge, final: ArticulatedFit, predicted: PredictedErrors, *, stated: bool) -> _Left:
     """What is left of records for judging that are asked as the problem is: by runs, or by the torque, which is never all of it."""
-    judged, runs = problem.settings.articulated.judgement, not isinstance(problem, TorqueProblem)
-    left = coloured(judging, final, judged) if runs else None
-    lost = astray(judging, final, predicted, judged) if runs else None
+    problem, judged = judge.problem, judge.settings
+    runs, believed = not isinstance(problem, TorqueProblem), judge.believed(final)
+    left = coloured(judge.judging, believed, judged) if runs else None
+    lost = astray(judge.judging, believed, predicted, judged) if runs else None
     # power above the noise at some frequencies shows that what is named is not all; where nothing is named it is no evidence that
     # something is missing, which takes an effect that predicts the judging records better
     noise_alone = lost is None and (left is None or not final.hypothesis) and complete(problem, final, judged)
@@ -276,9 +268,9 @@ def _run_away(problem: ArticulatedProblem) -> list[str]:
 def _with_free_runs(found: Explained) -> Verdict:
     """The verdict with what free runs miss beside what the torque does."""
     judging = found.judging
-    judged = judging.settings.articulated.judgement
-    floor = noise_floor(judging, found.final, judged)
-    before, after = (predict(judging, fit, floor, judged).discrepancy for fit in (None, found.final))
+    judge = Judge(found.problem, judging)
+    floor = judge.noise_floor(found.final)
+    before, after = (judge.predict(fit, floor).discrepancy for fit in (None, found.final))
     told = {
         joint.name: (float(before[j]), float(after[j]), float(floor[j]))
         for j, joint in enumerate(judging.joints)

@@ -56,6 +56,7 @@ class JointScales(NamedTuple):
         mass: Mass of the body.
         reach: Distance of the body's tip from its joint.
         middle: Mean angle; of an end of the tree its lowest height.
+        limit: Largest torque that the drive can give, or gave where nothing limits it.
     """
 
     force: float
@@ -67,6 +68,7 @@ class JointScales(NamedTuple):
     mass: float
     reach: float
     middle: float
+    limit: float
 
 
 @dataclass(frozen=True)
@@ -135,11 +137,17 @@ class ArticulatedEffect:
         }[parameter.scale]  # fmt: skip
 
     def works(self, eta: Array, scales: JointScales) -> bool:
-        """Whether it does within the travel of the joint what it is called for: bristles that never let go, and a stop that is never left,
-        are springs."""
+        """Whether it does within the travel of the joint what it is called for, and nothing that no such thing does.
+
+        Bristles that never let go, and a stop that is never left, are springs. Out of a gear comes more the harder its drive pulls, at
+        every torque that the drive can give: friction that takes more than what is added holds a joint for good wherever a record
+        reaches further than those that it was fitted to.
+        """
         values = self.values(eta, scales)
         if "side" in values:
             return values["side"] * values["position"] > -scales.position
+        if "growth" in values:
+            return values["mu_drive"] + 2.0 * values["growth"] * scales.limit < 1.0
         if self.family == "friction" and "stiffness" in values:
             return values["limit"] < values["stiffness"] * scales.position
         return True

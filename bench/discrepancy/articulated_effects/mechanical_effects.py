@@ -28,10 +28,13 @@ STRIBECK_VELOCITY = FreeParameter(
 
 
 def _part(name: str, middle: float, *grid: float) -> FreeParameter:
-    """Friction as a part of a torque that a gear carries: a middle within a factor of some seven with 95 %; a gear leaves something."""
+    """Friction as a part of a torque that a gear carries: a middle within a factor of some seven with 95 %; a gear leaves something.
+
+    More than four standard deviations are no more believed of it than of a stated number.
+    """
     mean, *points = (math.log(part / (1.0 - part)) for part in (middle, *grid))
     return FreeParameter(
-        name, mean=mean, std=1.0, bounds=(-7.0, 5.0), grid=tuple(points), unit="1", share=True
+        name, mean=mean, std=1.0, bounds=(-7.0, mean + 4.0), grid=tuple(points), unit="1", share=True
     )
 
 

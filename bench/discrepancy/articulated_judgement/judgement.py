@@ -8,7 +8,7 @@ keeps more than the noise, as well as its size is known.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
 from bench.discrepancy.articulated_judgement.torque_runs import TorqueRuns
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import complete, predecessors, shortened, steps
+from bench.discrepancy.articulated_search.search import believable, complete, predecessors, shortened, steps
 from bench.discrepancy.multibody.nominal_parameters import twins
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
@@ -70,13 +70,6 @@ class PredictedErrors:
         return PredictedErrors(self.power[:, mine], self.floor[mine], self.weight[mine])
 
 
-def believed(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> Array:
-    """The vector of a fit, its nominal parameters no further out than is believed."""
-    vector, n = found.vector.copy(), len(problem.nominal)
-    vector[:n] = np.clip(vector[:n], -settings.strained, settings.strained)
-    return vector
-
-
 def runs_of(problem: ArticulatedProblem) -> FreeRuns | TorqueRuns:
     """What explanations are judged by: free runs, or the torque where the model as stated runs away."""
     return TorqueRuns(problem) if isinstance(problem, TorqueProblem) else FreeRuns(problem)
@@ -84,10 +77,9 @@ def runs_of(problem: ArticulatedProblem) -> FreeRuns | TorqueRuns:
 
 def noise_floor(problem: ArticulatedProblem, found: ArticulatedFit, settings: JudgementSettings) -> Array:
     """NRMSE (n_joints,) that noise alone leaves, were the model of a fit right."""
-    vector = believed(problem, found, settings)
-    runs = runs_of(problem.settled(found.hypothesis, vector))
+    runs = runs_of(problem.settled(found.hypothesis, found.vector))
     jobs = [(j, r) for r in range(len(problem.records)) for j in range(len(problem.joints))]
-    left = in_threads(lambda job: runs.noise(job[0], found.hypothesis, vector, job[1]), jobs)
+    left = in_threads(lambda job: runs.noise(job[0], found.hypothesis, found.vector, job[1]), jobs)
     table = np.reshape(np.array(left), (len(problem.records), -1)) / runs.sizes
     return np.asarray(np.sqrt(np.mean(table**2, axis=0)), dtype=np.float64)
 
@@ -96,8 +88,7 @@ def predict(
     problem: ArticulatedProblem, found: ArticulatedFit | None, floor: Array, settings: JudgementSettings
 ) -> PredictedErrors:
     """Errors in a problem's records with a fit's model, with the nominal model as it is where None; `floor` as of `noise_floor`."""
-    hypothesis = found.hypothesis if found else ()
-    vector = believed(problem, found, settings) if found else np.zeros(len(problem.nominal))
+    hypothesis, vector = (found.hypothesis, found.vector) if found else ((), np.zeros(len(problem.nominal)))
     runs = runs_of(problem.settled(hypothesis, vector))
     joints = range(len(problem.joints))
     jobs = [(j, prepared) for prepared in runs.problem.motions(hypothesis, vector) for j in joints]
@@ -111,6 +102,39 @@ def predict(
     power = np.vstack([table[k : k + len(joints)].T for k in range(0, len(table), len(joints))])
     weight = np.array([runs.weight(j, hypothesis, vector) for j in joints])
     return PredictedErrors(np.minimum(power, 1e6), floor, weight)
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Records that chose nothing, and what fits predict of them, their nominal parameters no further out than is believed.
+
+    Attributes:
+        problem: Records for identification, to which a fit is made once more where it went further (`believable`).
+        judging: Records for judging.
+    """
+
+    problem: ArticulatedProblem
+    judging: ArticulatedProblem
+    _believed: dict[ArticulatedFit, ArticulatedFit] = field(init=False, default_factory=dict)
+
+    @property
+    def settings(self) -> JudgementSettings:
+        """Thresholds."""
+        return self.problem.settings.articulated.judgement
+
+    def believed(self, found: ArticulatedFit) -> ArticulatedFit:
+        """A fit as it is believed, made once."""
+        if found not in self._believed:
+            self._believed[found] = believable(self.problem, found)
+        return self._believed[found]
+
+    def noise_floor(self, found: ArticulatedFit) -> Array:
+        """As of `noise_floor`."""
+        return noise_floor(self.judging, self.believed(found), self.settings)
+
+    def predict(self, found: ArticulatedFit | None, floor: Array) -> PredictedErrors:
+        """As of `predict`."""
+        return predict(self.judging, found and self.believed(found), floor, self.settings)
 
 
 def ladder(problem: ArticulatedProblem, fits: Sequence[ArticulatedFit]) -> list[ArticulatedFit]:
@@ -139,33 +163,27 @@ class Kept(NamedTuple):
     fits: list[ArticulatedFit]
 
 
-def kept(
-    problem: ArticulatedProblem,
-    judging: ArticulatedProblem,
-    fits: Sequence[ArticulatedFit],
-    settings: JudgementSettings,
-) -> Kept:
+def kept(judge: Judge, fits: Sequence[ArticulatedFit]) -> Kept:
     """What the judging records bear out of the best of some fits.
 
     Effects are kept up to the last that improves on what was kept before it. One before it that did not improve when it was added is
     kept if the explanation is worse without it; one that another part of the same type shows, unless it is better without it.
 
     Args:
-        problem: Records for identification.
-        judging: Records for judging.
+        judge: Records that chose nothing.
         fits: All fitted hypotheses, the best first.
-        settings: Thresholds.
     """
+    problem, settings = judge.problem, judge.settings
     found, rungs = list(fits), ladder(problem, fits)
-    floor = noise_floor(judging, rungs[-1], settings)
+    floor = judge.noise_floor(rungs[-1])
     while True:
-        predictions = [predict(judging, rung, floor, settings) for rung in rungs]
-        last, doubtful = _climbed(judging, rungs, predictions, settings)
+        predictions = [judge.predict(rung, floor) for rung in rungs]
+        last, doubtful = _climbed(judge.judging, rungs, predictions, settings)
         for placed in doubtful:
             shorter = shortened(problem, rungs[last], (placed,))
             found.append(shorter)
-            at = judging.reached((placed,))
-            without = predict(judging, shorter, floor, settings).of(at)
+            at = judge.judging.reached((placed,))
+            without = judge.predict(shorter, floor).of(at)
             mine = predictions[last].of(at)
             shown = [
                 p for p in rungs[last].hypothesis if p not in doubtful and p.effect.name == placed.effect.name
@@ -244,11 +262,7 @@ def without_each(fits: Sequence[ArticulatedFit], final: ArticulatedFit) -> list[
 
 
 def alike(
-    problem: ArticulatedProblem,
-    fits: Sequence[ArticulatedFit],
-    final: ArticulatedFit,
-    predicted: PredictedErrors,
-    settings: JudgementSettings,
+    judge: Judge, fits: Sequence[ArticulatedFit], final: ArticulatedFit, predicted: PredictedErrors
 ) -> set[EffectKeys]:
     """Explanations, one effect of the final one exchanged for another at its joint, than which that predicts no better for sure.
 
@@ -259,12 +273,12 @@ def alike(
     nearly as likely.
 
     Args:
-        problem: Records for judging.
+        judge: Records that chose nothing.
         fits: All fitted hypotheses, the likeliest first.
         final: What is named, and leaves something.
         predicted: What it predicts.
-        settings: Thresholds.
     """
+    problem, settings = judge.judging, judge.settings
     own, likeliest = keys_of(final), dict[EffectKeys, ArticulatedFit]()
     for f in fits:
         if len(f.hypothesis) == len(own) and keys_of(f) != own:
@@ -282,7 +296,7 @@ def alike(
         close = final.log_posterior - f.log_posterior <= settings.rival
         if (noisy and not close) or not set(at) & set(problem.reached(gained)):
             continue
-        if not better(predict(problem, f, predicted.floor, settings).of(at), mine, settings):
+        if not better(judge.predict(f, predicted.floor).of(at), mine, settings):
             out.add(theirs)
     return out
 

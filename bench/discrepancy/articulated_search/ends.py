@@ -62,6 +62,6 @@ def ends_within(problem: ArticulatedProblem) -> list[End]:
         torque = float(np.linalg.norm([problem.scales(j).force for j in raising]))
         force = torque / float(np.linalg.norm(levers))
         speed = float(np.abs(np.concatenate(rates)).max())
-        scales = JointScales(force, force, rise, speed, 1.0, 1.0, 1.0, 1.0, float(heights.min()))
+        scales = JointScales(force, force, rise, speed, 1.0, 1.0, 1.0, 1.0, float(heights.min()), force)
         out.append(End(body, joint, tuple(j for j in raising if j != joint), scales))
     return out

@@ -17,6 +17,7 @@ from bench.discrepancy.articulated_search.rounds import (
     freed,
     grounds_of,
     quiet,
+    sound,
     strained,
 )
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
@@ -176,7 +177,9 @@ def _of_one_kind(
                 ]
                 progress(f"{name} at all parts of a type")
                 made = [_joined(problem, current, sorted(parts, key=lambda part: -part.log_posterior))]
-            yield max(made, key=lambda f: f.log_posterior), worth
+            made = [f for f in made if sound(problem, f)]
+            if made:
+                yield max(made, key=lambda f: f.log_posterior), worth
 
 
 def _begun(current: ArticulatedFit, placed: PlacedOnJoint) -> tuple[JointHypothesis, Array]:

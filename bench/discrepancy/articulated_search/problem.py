@@ -48,6 +48,7 @@ class ArticulatedProblem:
         settings: Thresholds of the diagnosis.
         deadline: When nothing further is screened or fitted, and fits end where they are.
         softness: Noise of the torque that is assumed beyond what is stated, see `softened`.
+        reach: How far nominal parameters go from what was stated, in stated standard uncertainties.
         nominal: Uncertain nominal parameters: those of bodies first, then joint by joint.
     """
 
@@ -57,6 +58,7 @@ class ArticulatedProblem:
     settings: DiagnosisSettings = DEFAULT
     deadline: Deadline = NEVER
     softness: float = 0.0
+    reach: float = np.inf
     nominal: tuple[Nominal, ...] = field(init=False)
     _corrected: MadeOnce[PreparedRecord] = field(init=False)
 
@@ -74,13 +76,8 @@ class ArticulatedProblem:
         deadline: Deadline = NEVER,
     ) -> Self:
         """Prepare records."""
-        return cls(
-            case,
-            model,
-            tuple(prepare(case, model, record, settings=settings) for record in records),
-            settings,
-            deadline,
-        )
+        prepared = tuple(prepare(case, model, record, settings=settings) for record in records)
+        return cls(case, model, prepared, settings, deadline)
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -312,7 +309,8 @@ class ArticulatedProblem:
         """Mean, standard deviation, lower and upper bound of a vector."""
         n = len(self.nominal)
         mean, std = [np.zeros(n)], [np.ones(n)]
-        lows, highs = [np.array([p.lowest for p in self.nominal])], [np.full(n, np.inf)]
+        lows = [np.array([max(p.lowest, -self.reach) for p in self.nominal])]
+        highs = [np.full(n, self.reach)]
         for placed in hypothesis:
             p = placed.effect.parameters
             mean.append(np.array([x.mean for x in p]))
@@ -347,4 +345,5 @@ class ArticulatedProblem:
             self.model.mass(joint.body) or 1.0,
             float(np.linalg.norm(self.model.tips[joint.body])) or 1.0,
             middle,
+            drive.strongest if np.isfinite(drive.strongest) else float(np.abs(torque).max()) or 1.0,
         )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +44,22 @@ def nominal_fit(problem: ArticulatedProblem) -> ArticulatedFit:
     """The nominal model alone, with the scales of the joints that it leaves."""
     vector = roughly(problem)
     return refitted(problem, (), vector, scale=ArticulatedFit.at(problem, (), vector).scale)
+
+
+def believable(problem: ArticulatedProblem, found: ArticulatedFit) -> ArticulatedFit:
+    """A fit whose nominal parameters go no further out than is believed, the others fitted beside them; itself where they do not.
+
+    What a fit moves together, a mass and what holds it up, is not held back one by one: that is worse than what was stated.
+    """
+    most, n = problem.settings.articulated.judgement.strained, len(problem.nominal)
+    if not np.any(np.abs(found.vector[:n]) > most):
+        return found
+    vector = found.vector.copy()
+    vector[:n] = np.clip(vector[:n], -most, most)
+    near = replace(problem, reach=most)
+    return refitted(
+        near, found.hypothesis, vector, scale=ArticulatedFit.at(near, found.hypothesis, vector).scale
+    )
 
 
 Misled = Callable[[ArticulatedProblem, ArticulatedFit, ArticulatedFit], bool]

@@ -135,7 +135,7 @@ class ArticulatedJudgementSettings:
             "Deviation of a nominal parameter, in its stated standard uncertainties, beyond which it is not believed (one "
             "normal number in 16000 is as far out)."
         ),
-        "Predictions are made with it there, and what needs more is not complete.",
+        "Predictions are made with it there, the others fitted beside it, and what needs more is not complete.",
     )
     small: float = setting(
         0.05,
