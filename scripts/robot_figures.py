@@ -177,7 +177,7 @@ def robots(told: Any) -> Figures:
         if row["before"] is None:  # refused: the verdict says why
             rows.append((what, row["verdict"], ""))
             continue
-        names = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in row["named"].items())
+        names = ", ".join(f"{name} {round(100.0 * share)} %" for name, share in row["named"].items())
         figure = f"{row['before']:.3g} → {row['after']:.3g}, noise {row['floor']:.3g}, {row['seconds']:.0f} s: {names or row['verdict']}"
         rows.append((what, figure, ""))
         rows += ROBOT_LIMITS[row["robot"]](row) if row["robot"] in ROBOT_LIMITS else []

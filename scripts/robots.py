@@ -178,7 +178,7 @@ def main(args: Args) -> None:
         return
     shown = Table("robot", "verdict", "named (share)", "before", "after", "floor", "s", "known")
     for row in rows:
-        named = ", ".join(f"{k} {100.0 * share:.0f} %" for k, share in row.named.items())
+        named = ", ".join(f"{k} {round(100.0 * share)} %" for k, share in row.named.items())
         numbers = [f"{x:.3g}" for x in (row.before, row.after, row.floor)]
         shown.add_row(row.robot, row.verdict, named, *numbers, f"{row.seconds:.0f}", row.known)
     console = Console(width=180)
