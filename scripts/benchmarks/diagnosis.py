@@ -211,7 +211,7 @@ def _against(peer: str, mine: list[Outcome], theirs: list[Outcome], *, limited: 
         shares("single effects, family right", lambda s: s.family),
         shares("joint: axis right", lambda s: s.place),
         shares("two effects: both named", lambda s: s.both_named),
-        shares("foreign effects called unknown", lambda s: s.unknown_caught),
+        shares("foreign effects called unknown, or what they are", lambda s: s.unknown_caught),
         shares("clean cases called clean", lambda s: 1.0 - s.false_alarms),
         lower("gap after over noise floor, median", np.minimum(gaps, DIVERGED_GAP), "≥ 1"),
         lower("seconds a case, median", seconds, pace),

@@ -51,12 +51,12 @@ class BlindScore:
         family: Share of single-effect cases with the right family.
         place: Share of named joint-rig effects at the right place.
         false_alarms: Share of clean cases with another verdict than "none".
-        unknown_caught: Share of foreign cases with the verdict "unknown".
-        unfinished: Share of foreign cases with the verdict "unknown", or with names that are said not to be all (`complete`).
+        unknown_caught: Share of foreign cases with the verdict "unknown", or named as what they are.
+        unfinished: Share of foreign cases like that, or with names that are said not to be all (`complete`).
         both_named: Share of double cases with both effects named.
         tellable: Share of right verdicts over all cases whose records can tell: expected log odds of at least `tellable`
             (foreign ones: `tellable_unknown`) against the nearest rival and against none, where the answers state them.
-        unknown_tellable: Share of the foreign cases among these that end in "unknown".
+        unknown_tellable: Share of the foreign cases among these that end so.
         struck_right: Share of cases with the true effect struck from the catalogue that end in unknown or in an effect of its family.
         struck_unknown: Share of them that end in unknown.
         sets_hold_truth: Share of verdicts with a declared indistinguishable set whose names, sets included, hold the truth.

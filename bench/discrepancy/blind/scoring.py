@@ -2,7 +2,8 @@
 
 What counts as right, by the class of a case:
 
-- none: the verdict *none* (anything else is a false alarm); foreign: the verdict *unknown*, or what it is by derivation.
+- none: the verdict *none* (anything else is a false alarm); foreign: the verdict *unknown*, or what it is: by
+  derivation, or by its own name and place where a catalogue has it that was not there when the case was made.
 - single, double: the verdict *effect*, with the withheld effects and no others, each at its place; one of them may be another
   member of a set that the verdict declares indistinguishable, if the set holds the truth.
 - struck (the true effect was taken out of the catalogue): *unknown*, or an effect of the truth's family.
@@ -133,7 +134,7 @@ def _right(
     if kind == "none":
         return verdict == "none"
     if kind == "foreign":
-        return verdict == "unknown"
+        return verdict == "unknown" or (verdict == "effect" and said == truth)
     if kind == "struck":
         own = {FAMILIES.get(name) for name, _ in truth}
         return verdict == "unknown" or (
