@@ -14,7 +14,7 @@ from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.articulated import further_fits
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
-from bench.discrepancy.articulated_judgement.judgement import kept
+from bench.discrepancy.articulated_judgement.judgement import Judge, kept
 from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.misfit import Octaves, transformed
@@ -136,7 +136,7 @@ def test_what_showed_nothing_when_it_was_added_is_taken_out_again(tmp_path):
         vector = np.concatenate([start, eta])
         scale = ArticulatedFit.at(problem, hypothesis, vector).scale
         fits.insert(0, refitted(problem, hypothesis, vector, scale=scale))
-    told = kept(problem, judging, fits, problem.settings.articulated.judgement)
+    told = kept(Judge(problem, judging), fits)
     assert [placed.key for placed in told.rungs[told.last].hypothesis] == [friction.key]
     assert told.predictions[told.last].discrepancy.max() < 100.0 * NOISE
     assert told.fits
