@@ -14,6 +14,7 @@ from bench.discrepancy.articulated_effects.slot_setters import (
     written,
 )
 from bench.discrepancy.effects.effect import FreeParameter, log_grid
+from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 
 LIMIT = FreeParameter("limit", "force", **SETTINGS.positive)
 LIMIT_0 = FreeParameter(
@@ -30,11 +31,17 @@ STRIBECK_VELOCITY = FreeParameter(
 def _part(name: str, middle: float, *grid: float) -> FreeParameter:
     """Friction as a part of a torque that a gear carries: a middle within a factor of some seven with 95 %; a gear leaves something.
 
-    More than four standard deviations are no more believed of it than of a stated number.
+    It goes no further up from there than is believed of a stated number.
     """
     mean, *points = (math.log(part / (1.0 - part)) for part in (middle, *grid))
     return FreeParameter(
-        name, mean=mean, std=1.0, bounds=(-7.0, mean + 4.0), grid=tuple(points), unit="1", share=True
+        name,
+        mean=mean,
+        std=1.0,
+        bounds=(-7.0, mean + JudgementSettings().strained),
+        grid=tuple(points),
+        unit="1",
+        share=True,
     )
 
 
