@@ -1,11 +1,13 @@
-"""Which explanations count as indistinguishable."""
+"""Which explanations count as indistinguishable, and how sure their effects are."""
 
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from bench.discrepancy.effects.catalogue import effect_named
 from bench.discrepancy.judgement.closing import as_borne_out
+from bench.discrepancy.judgement.doubt import like_a_stand_in, outside
 from bench.discrepancy.judgement.posterior import indistinguishable
 from bench.discrepancy.model.placement import Placed
 from bench.discrepancy.model.structure import Place
@@ -70,3 +72,18 @@ def test_further_effect_that_closes_nothing_for_sure_is_no_surer_than_even():
     assert [e.probability for e in small] == [0.99, 0.5, 0.99, 0.5]
     alone = as_borne_out([effect("gap", -0.1, -0.2, 0.1)], [])[0]
     assert alone[0].probability == 0.99  # what is named at all is judged as a whole
+
+
+def test_cause_beside_a_nominal_parameter_moved_to_where_it_is_hardly_believed_is_not_certain():
+    stays, moves = [0.4, -1.1, 0.7], [0.4, -4.0, 0.7]
+    assert like_a_stand_in(stays) == like_a_stand_in([]) == 1.0
+    assert outside(0.01, moved=stays) == pytest.approx(DEFAULT.judgement.coarse.unlike)
+    assert 0.1 < outside(0.01, moved=moves) < 0.5  # a wrong number is as likely as a wrong cause
+    # one of twelve is nearer to what chance makes than one of three
+    assert outside(0.01, moved=stays * 3 + moves) < outside(0.01, moved=moves)
+
+
+def test_parameter_tells_the_more_against_a_cause_the_farther_it_moves():
+    odds = [like_a_stand_in([far, 0.0]) for far in (2.0, 2.5, 3.0, 3.5, 4.0)]
+    assert odds == sorted(odds)
+    assert like_a_stand_in([3.0, 0.0]) == like_a_stand_in([-3.0, 0.0])

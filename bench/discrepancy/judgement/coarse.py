@@ -22,6 +22,7 @@ from bench.discrepancy.judgement.finalists import (
     as_good,
     finalists,
     held_out_as,
+    nominal_moves,
     without,
 )
 from bench.discrepancy.likelihood.problem import Array, Problem
@@ -150,10 +151,13 @@ def judge(
 def _doubts(chosen: Explanation, nothing: Explanation, known: Discrepancies) -> dict[tuple[str, str], float]:
     """Probability, for each effect of an explanation, that what it closes of the judging records is not its own."""
     settings, error = chosen.settings.judgement.coarse, chosen.settings.likelihood.error
+    moved = nominal_moves(chosen)
     out = dict[tuple[str, str], float]()
     for i, placed in enumerate(chosen.hypothesis):
         size, left = known.part(chosen, nothing if len(chosen.hypothesis) == 1 else without(chosen, i))
-        doubt = outside(left, settings, besides=settings.besides * like_small_things(size, error))
+        doubt = outside(
+            left, settings, besides=settings.besides * like_small_things(size, error), moved=moved
+        )
         key = placed.effect.name, placed.place.name
         out[key] = min(out.get(key, 1.0), doubt)
     return out

@@ -12,6 +12,7 @@ from functools import cache
 
 import numpy as np
 
+from bench.arrays import Array
 from bench.discrepancy.fitting.goodness_of_fit import complexity, free_parameters, key_of, log_prior_of
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.doubt import outside
@@ -182,9 +183,16 @@ def bounded(explanation: Explanation, within: float) -> Explanation:
 
 def strained(explanation: Explanation, within: float) -> bool:
     """Whether an explanation moves a nominal parameter by more than `within` of its stated standard deviations."""
-    return any(
-        bool(np.any(np.abs(fitted.vector[: problem.n_physical]) > within))
-        for problem, fitted in explanation.parts
+    return bool(np.any(np.abs(nominal_moves(explanation)) > within))
+
+
+def nominal_moves(explanation: Explanation) -> Array:
+    """Stated standard deviations (n,) by which an explanation moves the uncertain nominal parameters."""
+    return np.concatenate(
+        [
+            fitted.vector[: problem.n_physical][problem.spread[: problem.n_physical] > 0.0]
+            for problem, fitted in explanation.parts
+        ]
     )
 
 

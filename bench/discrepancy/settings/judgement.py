@@ -25,6 +25,11 @@ class CoarseSettings:
             "named as an error of that parameter."
         ),
     )
+    stated_too_surely: float = setting(
+        0.05,
+        "Share of nominal parameters that may lie anywhere within these limits, whatever was stated of them.",
+        "As rare as causes that no catalogue holds: where one of the two has to be, neither is likelier.",
+    )
     material: float = setting(
         0.1,
         "Part of the discrepancy of the nominal model, its parameters re-estimated, that an effect closes to be named.",
