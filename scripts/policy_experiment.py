@@ -8,8 +8,8 @@
 `rewards` runs some 200 records of drawn rigs under many excitations, without and with a background, identifies each, and tells how
 well each reward ranks the error that is left: Spearman's rank correlation, 1 where the reward follows identification. `train` trains
 policies for different rewards, without and with a memory of the record, and holds them against the planner and open-loop designs on
-held-out rigs; stopped, the same command goes on. `backgrounds` does the latter with policies that are there. `targets` designs joint
-targets for a model of your own.
+held-out rigs. `backgrounds` does the latter with policies that are there. Stopped, either goes on by the same command. `targets` designs
+joint targets for a model of your own.
 """
 
 from __future__ import annotations
@@ -114,7 +114,9 @@ class Train:
             policies = trained(
                 self.task, self.rewards, self.memories, self.seeds, self.steps, self.out, status.update
             )
-            rows = contest(setup, policies, seeds=self.rig_seeds, rigs=self.rigs, tell=status.update)
+            rows = contest(
+                setup, policies, seeds=self.rig_seeds, rigs=self.rigs, folder=self.out, tell=status.update
+            )
         numbers: dict[str, Any] = {"task": self.task, "steps": self.steps, **summary(rows)}
         if self.figure is not None:
             contest_figure(numbers, self.figure)
@@ -131,6 +133,7 @@ class Backgrounds:
         planner: Also the planner.
         rig_seeds: Seeds of held-out rigs.
         rigs: Held-out rigs a seed, each without and with a background.
+        out: Folder of what is done so far; stopped, the same command goes on.
         json: File for the figures; "-" prints them.
         figure: File for a figure (.svg, .png or .pdf).
     """
@@ -140,6 +143,7 @@ class Backgrounds:
     planner: bool = True
     rig_seeds: int = 10
     rigs: int = 50
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("out/policy_experiment")
     json: Path | None = None
     figure: Path | None = None
 
@@ -159,6 +163,7 @@ class Backgrounds:
                 seeds=self.rig_seeds,
                 rigs=self.rigs,
                 planner=self.planner,
+                folder=self.out,
                 tell=status.update,
             )
         numbers: dict[str, Any] = {"task": self.task, **summary(rows)}

@@ -5,6 +5,8 @@ They are held against each other on held-out rigs without and with a background.
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable, Mapping
 from itertools import product
 from pathlib import Path
@@ -14,17 +16,17 @@ import numpy as np
 from evaluate_excitation import interval, middle
 from numpy.typing import NDArray
 
-from bench.excitation import Planner, Policy, RigPrior, estimate
-from bench.excitation.acting import ActingPolicy
+from bench.excitation import Planner, PlanPolicy, Policy, RigPrior, estimate
 from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
 from bench.excitation.stepping import Packed
+from bench.files import write_text
 from envs.background import background_of
 from envs.setups import Setup
-from policies.judge import HELD_OUT
+from policies.judge import HELD_OUT, fingerprint
 
 from .trials import kinds_of, open_loop
 
-Source = ActingPolicy | Planner | NDArray[np.float64]
+Source = Policy | PlanPolicy | Planner | NDArray[np.float64]
 BASELINES = ("random_multisine", "schroeder", "crest_multisine", "log_sweep", "prbs", "d_optimal")
 
 
@@ -64,14 +66,17 @@ def trained(
 
 def contest(
     setup: Setup,
-    policies: Mapping[str, ActingPolicy],
+    policies: Mapping[str, Policy | PlanPolicy],
     *,
     seeds: int,
     rigs: int,
     planner: bool = True,
+    folder: Path,
     tell: Callable[[str], None],
 ) -> list[dict[str, Any]]:
     """One row a held-out rig and method: what identification leaves, and how many windows passed a limit.
+
+    Stopped, the same call goes on after the last seed that was done.
 
     Args:
         setup: The laboratory.
@@ -79,6 +84,7 @@ def contest(
         seeds: Seeds of rigs.
         rigs: Rigs a seed, each without and with its background.
         planner: Also the planner, and the one that designs for backgrounds.
+        folder: Where the rows of every seed are kept.
         tell: Called with what is done.
     """
     prior, station = setup.questions[0], setup.station()
@@ -90,27 +96,47 @@ def contest(
         opening = opened["d_optimal"]
         sources["planner"] = Planner(prior, station, opening)
         sources["planner for backgrounds"] = Planner(prior, station, opening, background=background_of(setup))
-    noise = np.array([station.noise[name] for name in station.channels])
+    made_with = json.dumps([str(setup.recipe), rigs, {name: _made_of(own) for name, own in sources.items()}])
+    digest = hashlib.sha256(made_with.encode()).hexdigest()[:12]
     rows = []
     for seed in range(seeds):
-        rng = np.random.default_rng(HELD_OUT + seed)
-        for kind in kinds_of(setup, rigs, rng):
-            n = len(kind.coordinates)
-            for real in (False, True):
-                packed = kind.real.packed(np.concatenate([kind.coordinates, real * kind.background], axis=1))
-                disturbance = disturbances(station, n, rng)
-                for name, source in sources.items():
-                    tell(f"seed {seed}, {kind.family.hypothesis.name}: {name}")
-                    runs = _run(source, setup, packed, disturbance, seed)
-                    off = estimate(kind.family, runs.records, noise).coordinates - kind.coordinates
-                    rows += [
-                        {
-                            "method": name, "seed": seed, "kind": kind.family.hypothesis.name, "background": real,
-                            "error": float(np.sqrt(np.mean(off[i] ** 2))),
-                            "violations": int(runs.violations[i]), "windows": int(runs.windows[i]),
-                        }
-                        for i in range(n)
-                    ]  # fmt: skip
+        kept = folder / f"rows-{digest}-seed-{seed}.json"
+        if not kept.is_file():
+            write_text(kept, json.dumps(_rows_of(setup, sources, seed, rigs, tell)))
+        rows += json.loads(kept.read_text(encoding="utf-8"))
+    return rows
+
+
+def _made_of(source: Source) -> str:
+    """What tells a method from others of its name."""
+    background = str(source.background) if isinstance(source, Planner) else ""
+    return fingerprint([source] if isinstance(source, np.ndarray) else source) + background
+
+
+def _rows_of(
+    setup: Setup, sources: Mapping[str, Source], seed: int, rigs: int, tell: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    """Rows of the rigs of a seed."""
+    station, rows = setup.station(), []
+    noise = np.array([station.noise[name] for name in station.channels])
+    rng = np.random.default_rng(HELD_OUT + seed)
+    for kind in kinds_of(setup, rigs, rng):
+        n = len(kind.coordinates)
+        for real in (False, True):
+            packed = kind.real.packed(np.concatenate([kind.coordinates, real * kind.background], axis=1))
+            disturbance = disturbances(station, n, rng)
+            for name, source in sources.items():
+                tell(f"seed {seed}, {kind.family.hypothesis.name}: {name}")
+                runs = _run(source, setup, packed, disturbance, seed)
+                off = estimate(kind.family, runs.records, noise).coordinates - kind.coordinates
+                rows += [
+                    {
+                        "method": name, "seed": seed, "kind": kind.family.hypothesis.name, "background": real,
+                        "error": float(np.sqrt(np.mean(off[i] ** 2))),
+                        "violations": int(runs.violations[i]), "windows": int(runs.windows[i]),
+                    }
+                    for i in range(n)
+                ]  # fmt: skip
     return rows
 
 
