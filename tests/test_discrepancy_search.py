@@ -236,3 +236,34 @@ def test_a_relative_of_fewer_parameters_is_fitted_beside_what_else_is_missing():
     simplify(found, candidates, most=1)
     assert {p.key for p in found.ranked()[0].hypothesis} == {dry.key, drag.key}  # the curve gains nothing
     assert not any(spring in f.hypothesis for f in found.ranked(2))  # it is no relative of friction
+
+
+def test_what_a_sensor_changes_is_read_off_the_motion_of_one_free_run(monkeypatch):
+    case = planted_case(lambda force: motion_with(force, lambda x, v, z: (1.5 * np.tanh(v / 1e-3), [])))
+    problem = Problem(case, structure := structure_of(case), case.identification)
+    chosen = {
+        name: next(p for p in placements(case, structure, [effect_named(name)]))
+        for name in ("coulomb_friction", "displacement_gain_error", "acceleration_delay", "force_delay")
+    }
+    hypothesis = (chosen["coulomb_friction"], chosen["displacement_gain_error"])
+    vector = np.array([0.1, -0.2, 0.3, -1.0, 0.4])
+    near = problem.residual_near(hypothesis, vector)
+    runs, whole = [], type(problem).free_motion
+    monkeypatch.setattr(
+        type(problem),
+        "free_motion",
+        lambda self, *given, **more: runs.append(1) or whole(self, *given, **more),
+    )
+    moved = vector + np.array([0.0, 0.0, 0.0, 0.0, 0.5])
+    delay = chosen["acceleration_delay"]
+    late = np.append(vector, [p.mean for p in delay.effect.parameters])
+    found = [near(moved), near(late, delay)]
+    assert len(runs) == len(case.identification)
+    near(np.append(vector, -3.0), chosen["force_delay"])  # acts on what moves
+    near(vector + np.array([0.1, 0.0, 0.0, 0.0, 0.0]))
+    assert len(runs) == 3 * len(case.identification)
+    np.testing.assert_array_equal(found[0], problem.residual(hypothesis, moved))
+    np.testing.assert_array_equal(
+        found[1], problem.residual((*hypothesis, chosen["acceleration_delay"]), late)
+    )
+    assert np.any(found[0] != found[1])

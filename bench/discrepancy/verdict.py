@@ -101,7 +101,8 @@ def far_off(estimates: Iterable[NominalEstimate], sigmas: float) -> tuple[str, .
     """
     return tuple(
         f"'{p.name}' is re-estimated at {p.value:.4g}, {p.shift_in_std:+.1f} of its stated standard deviations from {p.stated:.4g}: "
-        "it was stated too surely, or something that scales like it is wrong, such as the gain of a sensor"
+        "it was stated too surely, something that scales like it is wrong, such as the gain of a sensor, or it makes up for what no "
+        "effect of this explanation describes"
         for p in estimates
         if abs(p.shift_in_std) > sigmas
     )

@@ -28,7 +28,7 @@ from bench.discrepancy.likelihood.whitening import (
     without_bridged,
 )
 from bench.discrepancy.likelihood.window_whitening import RestartWindows, white_force, window_weights
-from bench.discrepancy.model.placement import Hypothesis
+from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.motion.observer import ACCELERATION
 from bench.discrepancy.motion.prescribed import decided
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
@@ -188,20 +188,53 @@ class Problem(Simulator):
         What other starts of windows would change is that at the one vector. It moves with the vector, too, and with it the residuals by
         the product of that and of how wrong the starts are, which noise alone makes them; L. Kaufman, A variable projection method for
         solving separable nonlinear least squares problems, BIT 15 (1975) 49-57. So a column of differences takes one free run, not one
-        more for each entry of a start.
+        more for each entry of a start; and none where sensors alone differ, which read the same motion.
         """
         bases: list[Sequence[Array] | None] = (
             in_threads(lambda data: self._reached(data, hypothesis, vector), self.data)
             if self.windowed
             else [None] * len(self.data)
         )
-        return lambda moved, *beside: self._residual((*hypothesis, *beside), moved, bases)
+        acting = self._acting(hypothesis)
+        motions: dict[str, Motion] = {}
+
+        def motion_of(data: RecordData) -> Motion:
+            """Motion at the one vector; of threads that ask at once each makes it, the same."""
+            if data.record.name not in motions:
+                motions[data.record.name] = self.free_motion(hypothesis, vector, data.record)
+            return motions[data.record.name]
+
+        def near(moved: Array, *beside: Placed) -> Array:
+            sensors = all(placed.effect.site == "sensor" for placed in beside)
+            known = (
+                not self.driven and sensors and np.array_equal(moved[: len(vector)][acting], vector[acting])
+            )
+            return self._residual((*hypothesis, *beside), moved, bases, motion_of if known else None)
+
+        return near
+
+    def _acting(self, hypothesis: Hypothesis) -> NDArray[np.bool_]:
+        """Entries of a vector that the motion depends on: all but those of sensors."""
+        effects = [
+            np.full(len(placed.effect.parameters), placed.effect.site != "sensor") for placed in hypothesis
+        ]
+        return np.concatenate([np.ones(len(self.nominal), dtype=bool), *effects])
 
     def _residual(
-        self, hypothesis: Hypothesis, vector: Array, bases: Sequence[Sequence[Array] | None]
+        self,
+        hypothesis: Hypothesis,
+        vector: Array,
+        bases: Sequence[Sequence[Array] | None],
+        motion_of: Callable[[RecordData], Motion] | None = None,
     ) -> Array:
         parts = in_threads(
-            lambda task: self.residual_of(task[0], hypothesis, vector, bases=task[1]),
+            lambda task: self.residual_of(
+                task[0],
+                hypothesis,
+                vector,
+                bases=task[1],
+                motion=None if motion_of is None else motion_of(task[0]),
+            ),
             list(zip(self.data, bases, strict=True)),
         )
         finite = [part for part in parts if part is not None]
@@ -226,12 +259,13 @@ class Problem(Simulator):
         *,
         lenient: bool = True,
         bases: Sequence[Array] | None = None,
+        motion: Motion | None = None,
     ) -> Array | None:
         """Whitened residuals of one record, jumps that come a little early or late excused if `lenient`; None where it diverged.
 
-        What other starts of windows would change is `bases`, where these are given.
+        What other starts of windows would change is `bases`, and the motion of the free run `motion`, where these are given.
         """
-        predicted = self.simulate(hypothesis, vector, data.record)
+        predicted = self.simulate(hypothesis, vector, data.record, motion=motion)
         if not np.isfinite(predicted).all():
             return None
         bases = self._reached(data, hypothesis, vector, predicted) if bases is None else bases

@@ -102,6 +102,7 @@ class Simulator(MeasuredCase):
         *,
         starts: Array | None = None,
         own_forces: bool = True,
+        motion: Motion | None = None,
     ) -> Array:
         """Free run of a hypothesis.
 
@@ -111,6 +112,7 @@ class Simulator(MeasuredCase):
             record: Record whose loads drive the run.
             starts: (n_windows, 2 n_dof) positions and velocities at `firsts`; those of `starts_of` where None.
             own_forces: Whether the nominal model keeps its own dry friction and bending springs.
+            motion: What `free_motion` returns, where it is known: effects of sensors do not change it.
 
         Returns:
             (n, n_channels) predicted responses; NaN where it diverged.
@@ -118,7 +120,8 @@ class Simulator(MeasuredCase):
         values, etas = self.split(hypothesis, vector)
         if self.driven:
             return self._driven_response(hypothesis, etas, values, record)
-        motion = self.free_motion(hypothesis, vector, record, starts=starts, own_forces=own_forces)
+        if motion is None:
+            motion = self.free_motion(hypothesis, vector, record, starts=starts, own_forces=own_forces)
         channels = self.observe(hypothesis, etas, motion, record.step)
         return self.acquired(self.picked_up(hypothesis, etas, channels, record), record)
 
