@@ -62,7 +62,8 @@ class Row:
 
     Attributes:
         case: Its name.
-        grade: "right", "honest" or "wrong"; "refused" where it was not diagnosed, empty where nothing was written down.
+        grade: "right", "honest" or "wrong"; "refused" where it should have been diagnosed; empty where nothing was
+            written down.
         verdict: "effect", "none", "unknown", or why it was refused.
         named: Names with their probabilities.
         sets: Declared sets.
@@ -161,9 +162,9 @@ def _row(name: str, found: Mapping[str, Any], acceptance: Acceptance | None) -> 
     shown = peer.get("refused", "") if said is None else said or "none"
     why = "" if acceptance is None else acceptance.why
     if "refused" in found:
-        return Row(
-            name, "refused", found["refused"], {}, [], None, None, found["cpu_seconds"], shown, own, why
-        )
+        message = found["refused"]
+        grade = "refused" if acceptance is None else acceptance.refused(message)
+        return Row(name, grade, message, {}, [], None, None, found["cpu_seconds"], shown, own, why)
     return Row(
         name,
         "" if acceptance is None else acceptance.grade(found),

@@ -71,6 +71,13 @@ def test_a_verdict_is_graded_by_what_was_written_down(wanted, said, grade):
     assert wanted.grade(said) == grade
 
 
+def test_a_refusal_is_right_where_it_says_what_is_wrong():
+    wanted = Acceptance((frozenset({"acceleration_gain_error"}),), refusal=("'acceleration'", "in g"))
+    assert wanted.refused("is 'acceleration' in g?") == "right"
+    assert wanted.refused("'acceleration' has a gap") == "refused"
+    assert PLAY.refused("is 'acceleration' in g?") == "refused"
+
+
 def test_every_measured_case_has_an_entry_and_the_longest_name_counts(tmp_path):
     known = acceptances()
     sources = {path.stem for path in (SCRIPTS / "measured").glob("[a-z]*.py")} - {"acceptance", "target"}

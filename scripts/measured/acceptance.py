@@ -30,12 +30,18 @@ class Acceptance:
         also: Names that may stand beside them, likewise.
         nrmse: Largest discrepancy that may be left on the judging records; none where None.
         why: What is known of the case, and from whom.
+        refusal: Words that a refusal to diagnose it has to hold to be right; none where no refusal is.
     """
 
     right: tuple[frozenset[str], ...]
     also: frozenset[str] = frozenset()
     nrmse: float | None = None
     why: str = ""
+    refusal: tuple[str, ...] = ()
+
+    def refused(self, message: str) -> Grade | Literal["refused"]:
+        """Grade a refusal: right where that is what was asked for, and the message says what is wrong."""
+        return "right" if self.refusal and all(word in message for word in self.refusal) else "refused"
 
     def grade(self, verdict: Mapping[str, Any]) -> Grade:
         """Grade a verdict.
@@ -88,12 +94,13 @@ def acceptances(file: Path = FILE) -> dict[str, Acceptance]:
     """What is right, by the beginning of the cases' names.
 
     Args:
-        file: JSON with "cases", name to "right", "also", "nrmse" and "why".
+        file: JSON with "cases", name to "right", "also", "nrmse", "why" and "refusal".
     """
     entries = json.loads(file.read_text(encoding="utf-8"))["cases"]
     return {
         name: Acceptance(
-            tuple(frozenset(group) for group in entry["right"]), frozenset(entry.get("also", ())), entry.get("nrmse"), entry.get("why", "")
+            tuple(frozenset(group) for group in entry["right"]), frozenset(entry.get("also", ())), entry.get("nrmse"),
+            entry.get("why", ""), tuple(entry.get("refusal", ())),
         )
         for name, entry in entries.items()
     }  # fmt: skip

@@ -149,6 +149,7 @@ class Case:
         also: Names that are there in small size and may stand beside.
         limit: Largest NRMSE of a corrected model that is accepted; "derived" from the sizes.
         honest: Which other verdicts are honest, in words.
+        refusal: Words that a refusal has to hold, where refusing the case is right.
         why: What is there.
     """
 
@@ -169,6 +170,7 @@ class Case:
     also: Sequence[str]
     limit: float | Literal["derived"] = "derived"
     honest: str = NO_NAME
+    refusal: Sequence[str] = ()
     why: str
 
     def generator(self, seed: int) -> np.random.Generator:

@@ -91,7 +91,8 @@ LOGGERS = (
         right=[["acceleration_gain_error"]],
         also=["carried_mass", "coulomb_friction"],
         limit=0.2,
-        honest="best: refused before any fit, with acceleration and 9.81 in the message (grade by hand); unknown",
+        honest="best: refused before any fit, the message naming the acceleration and its unit; unknown",
+        refusal=["'acceleration'", '"unit": "g"'],
         why="Nothing of size is missing in the mechanics; the column of the acceleration is in g, nominal.json says m/s^2 (a "
         "factor 9.81). A refusal that names the unit is right; by --anyway an acceleration_gain_error. Small besides: a small "
         "mass on a spring (10 Hz), friction along the stroke.",

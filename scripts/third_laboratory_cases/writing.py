@@ -143,6 +143,7 @@ def acceptance(all_made: Sequence[Made]) -> dict[str, Any]:
             "also": list(case.also),
             "nrmse": limit(case, simulated.sizes),
             "why": case.why,
+            "refusal": list(case.refusal),
         }
         for case, simulated in all_made
     }
