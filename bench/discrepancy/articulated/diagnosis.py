@@ -116,21 +116,20 @@ def diagnose_articulated(
     case = with_beginnings(whole := thinned(told, settings=settings), settings=settings)
     problem = stepped(case, model, settings, deadline)
 
-    def asked(case: Case, problem: ArticulatedProblem) -> Explained:
+    def asked(problem: ArticulatedProblem) -> Explained:
         judging = ArticulatedProblem.of(case, model, case.validation, problem.settings)
         question = Question(judging, how, rng, stated, progress)
         return explained(problem, placements(problem, catalogue), question)
 
-    found = asked(case, problem)
+    found = asked(problem)
     steps_kept = all(a.step == b.step for a, b in zip(told.identification, case.identification, strict=True))
     held = _read_as_held(case, found) if steps_kept else None  # of samples that were thinned none was held
     if held is not None and deadline.allows("once more, the inputs read as held between their samples"):
         progress("once more, the inputs read as held between their samples")
-        again = asked(held, stepped(held, model, settings, deadline))
-        if _plainer(again, found):
-            case, notes, found = held, (*notes, HELD), again
+        case, notes = held, (*notes, HELD)
+        found = asked(stepped(case, model, settings, deadline))
     if not _accurate(problem, found, settings):  # with what is named, long steps tell something else
-        found = asked(case, ArticulatedProblem.of(case, model, case.identification, settings, deadline))
+        found = asked(ArticulatedProblem.of(case, model, case.identification, settings, deadline))
     problem, fits, final, verdict = found.problem, found.fits, found.final, found.verdict
     notes = (*notes, *_of_long_records(told, whole, found), *_followed(problem), *deadline.untried)
     verdict = replace(verdict.in_haste() if deadline.skipped else verdict, settings=changed(settings))
@@ -147,8 +146,8 @@ def diagnose_articulated(
 
 
 def _read_as_held(case: Case, found: Explained) -> Case | None:
-    """The case with its inputs held from sample to sample, where nobody says how they are to be read and that explains most of what
-    was named instead: a hold is late by half a sample, at every actuator."""
+    """The case with its inputs held from sample to sample, where nobody says how they are to be read and that does at least as well as what
+    was named instead: a hold is late by half a sample."""
     if STATED in case.options:
         return None
     problem, final = found.problem, found.final
@@ -166,19 +165,8 @@ def _read_as_held(case: Case, found: Explained) -> Case | None:
     other = ArticulatedProblem.of(
         held, problem.model, held.identification, problem.settings, problem.deadline
     )
-    without = shortened(problem, final, late).log_posterior
-    instead = shortened(asked_as(problem, other.softened(problem.softness)), final, late).log_posterior
-    most = problem.settings.judgement.mostly * (final.log_posterior - without)
-    return held if instead >= without + most else None
-
-
-def _plainer(held: Explained, found: Explained) -> bool:
-    """Whether inputs that are held explain the records as well as what was named instead, each effect at what one has to add."""
-    if type(held.problem) is not type(found.problem) or held.problem.softness != found.problem.softness:
-        return False  # other likelihoods
-    worth = found.problem.settings.articulated.search.worth
-    own, other = (e.final.log_posterior - worth * len(e.final.hypothesis) for e in (held, found))
-    return own >= other
+    fitted = shortened(asked_as(problem, other.softened(problem.softness)), final, late)
+    return held if fitted.log_posterior >= final.log_posterior else None
 
 
 def _next_test(compiled: mujoco.MjModel, found: Explained) -> JointProposal | None:
