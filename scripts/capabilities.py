@@ -288,7 +288,7 @@ CAPABILITIES: Sequence[Capability] = (
     Capability(
         "backgrounds_sdof",
         "Policy `sdof` on rigs with a background that no hypothesis holds",
-        words("python scripts/policy_experiment.py backgrounds sdof --no-planner --json -"),
+        words("python scripts/policy_experiment.py backgrounds sdof --json -"),
         backgrounds,
         hours=True,
     ),
