@@ -263,7 +263,5 @@ def test_what_a_sensor_changes_is_read_off_the_motion_of_one_free_run(monkeypatc
     near(vector + np.array([0.1, 0.0, 0.0, 0.0, 0.0]))
     assert len(runs) == 3 * len(case.identification)
     np.testing.assert_array_equal(found[0], problem.residual(hypothesis, moved))
-    np.testing.assert_array_equal(
-        found[1], problem.residual((*hypothesis, chosen["acceleration_delay"]), late)
-    )
+    np.testing.assert_array_equal(found[1], problem.residual((*hypothesis, delay), late))
     assert np.any(found[0] != found[1])

@@ -23,7 +23,7 @@ def noise_alone(monkeypatch):
     return found
 
 
-def test_contest_goes_on_after_the_last_seed_that_was_done(noise_alone, monkeypatch, tmp_path):
+def test_contest_goes_on_after_the_last_seed_that_was_done(noise_alone, tmp_path):
     def held(seeds, told=lambda text: None):
         return contest.contest(
             sdof_setup(), {}, seeds=seeds, rigs=3, planner=False, folder=tmp_path, tell=told
