@@ -15,32 +15,25 @@ import numpy as np
 
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.explaining import Explained, Question, asked_as, explained
+from bench.discrepancy.articulated.held_inputs import HELD, does_as_well, read_as_held
 from bench.discrepancy.articulated.naming import closest_rival
 from bench.discrepancy.articulated.next_test import JointProposal, Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
 from bench.discrepancy.articulated.stepping import accurate, stepped
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
-from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint, placed_values
 from bench.discrepancy.articulated_judgement.judgement import predict
 from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import shortened
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.long_records import after, long_record_notes, thinned, with_beginnings
 from bench.discrepancy.effects.catalogue import CATALOGUE as LINEAR
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.numerics.deadline import NEVER, Deadline
-from bench.discrepancy.search.load_interpolation import STATED
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
 from bench.discrepancy.verdict import Verdict, far_off
 from bench.errors import UnknownNameError
-
-HELD = (
-    "inputs are read as held from sample to sample, which explains the records without a delay of half a sample; state "
-    '"load_interpolation": "zero_order_hold" if they were'
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,22 +107,30 @@ def diagnose_articulated(
     told, compiled, notes = admitted_robot(case, anyway=anyway, settings=settings)
     model = ArticulatedModel.of(compiled, case.rig)
     case = with_beginnings(whole := thinned(told, settings=settings), settings=settings)
-    problem = stepped(case, model, settings, deadline)
 
-    def asked(problem: ArticulatedProblem) -> Explained:
-        judging = ArticulatedProblem.of(case, model, case.validation, problem.settings)
+    def explain(problem: ArticulatedProblem) -> Explained:
+        judging = ArticulatedProblem.of(problem.case, model, problem.case.validation, problem.settings)
         question = Question(judging, how, rng, stated, progress)
         return explained(problem, placements(problem, catalogue), question)
 
-    found = asked(problem)
+    def asked(case: Case) -> Explained:
+        """In steps that are short enough, for the nominal model and for what is named."""
+        problem = stepped(case, model, settings, deadline)
+        found = explain(problem)
+        if _accurate(problem, found, settings):
+            return found
+        return explain(ArticulatedProblem.of(case, model, case.identification, settings, deadline))
+
+    found = asked(case)
     steps_kept = all(a.step == b.step for a, b in zip(told.identification, case.identification, strict=True))
-    held = _read_as_held(case, found) if steps_kept else None  # of samples that were thinned none was held
-    if held is not None and deadline.allows("once more, the inputs read as held between their samples"):
-        progress("once more, the inputs read as held between their samples")
-        case, notes = held, (*notes, HELD)
-        found = asked(stepped(case, model, settings, deadline))
-    if not _accurate(problem, found, settings):  # with what is named, long steps tell something else
-        found = asked(ArticulatedProblem.of(case, model, case.identification, settings, deadline))
+    held = read_as_held(case, found) if steps_kept else None  # of samples that were thinned none was held
+    if held is not None and deadline.allows(
+        once_more := "once more, the inputs read as held between their samples"
+    ):
+        progress(once_more)
+        other = asked(held.case)
+        if does_as_well(other, found, held.without):
+            case, found, notes = held.case, other, (*notes, HELD)
     problem, fits, final, verdict = found.problem, found.fits, found.final, found.verdict
     notes = (*notes, *_of_long_records(told, whole, found), *_followed(problem), *deadline.untried)
     verdict = replace(verdict.in_haste() if deadline.skipped else verdict, settings=changed(settings))
@@ -143,30 +144,6 @@ def diagnose_articulated(
         case, model, problem, found.judging, tuple(fits), final, matrix_of(problem, fits), verdict,
         None if proposal is None else proposal.trajectory,
     )  # fmt: skip
-
-
-def _read_as_held(case: Case, found: Explained) -> Case | None:
-    """The case with its inputs held from sample to sample, where nobody says how they are to be read and that does at least as well as what
-    was named instead: a hold is late by half a sample."""
-    if STATED in case.options:
-        return None
-    problem, final = found.problem, found.final
-    step = max(record.step for record in case.identification)
-    late, at = list[PlacedOnJoint](), len(problem.nominal)
-    for placed in final.hypothesis:
-        end = at + len(placed.effect.parameters)
-        values = placed_values(placed, final.vector[at:end])
-        if any(0.0 < values.get(name, 0.0) < step for name in ("delay_s", "time_constant_s")):
-            late.append(placed)
-        at = end
-    if not late:
-        return None
-    held = replace(case, options={**case.options, STATED: "zero_order_hold"})
-    other = ArticulatedProblem.of(
-        held, problem.model, held.identification, problem.settings, problem.deadline
-    )
-    fitted = shortened(asked_as(problem, other.softened(problem.softness)), final, late)
-    return held if fitted.log_posterior >= final.log_posterior else None
 
 
 def _next_test(compiled: mujoco.MjModel, found: Explained) -> JointProposal | None:
