@@ -20,11 +20,8 @@ from bench.discrepancy.articulated.next_test import propose
 from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
 from bench.discrepancy.articulated_judgement.free_runs import FreeRuns
-from bench.discrepancy.articulated_judgement.judgement import (
-    JudgementSettings,
-    PredictedErrors,
-    closed_of_nominal,
-)
+from bench.discrepancy.articulated_judgement.judgement import JudgementSettings
+from bench.discrepancy.articulated_judgement.predicted_errors import PredictedErrors, closed_of_nominal
 from bench.discrepancy.articulated_judgement.whiteness import coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, fit, refitted
 from bench.discrepancy.articulated_search.placements import placements
@@ -176,6 +173,21 @@ def test_what_was_left_out_is_named_at_its_place(tmp_path, name):
     write_report(found, tmp_path / "report.html")
     write_rerun(found, tmp_path / "run.rrd")
     assert wanted[0] in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.slow
+def test_a_gain_that_was_stated_too_surely_closes_what_it_makes_of_the_model_as_stated(tmp_path):
+    # 4.2 of its stated standard deviations low: the parameter explains as much by itself, if with a value that nobody believes
+    truth = mjcf(servo=True, friction=0.06).replace('kp="40.0"', 'kp="31.6"')
+    found = diagnose(read_case(write_case(tmp_path, truth, servo=True))).verdict
+    gain, friction = found.named
+    assert (gain.name, gain.where) == ("servo_gain_error", "elbow_drive")
+    assert gain.parameters["relative_error"].value == pytest.approx(-0.21, abs=0.02)
+    assert gain.closed > 0.9
+    assert (friction.name, friction.where) == ("coulomb_friction", "elbow")
+    # without damping in the drive all that it does is its gain times something
+    assert found.indistinguishable == (("force_gain_error", "servo_gain_error"),)
+    assert max(abs(p.shift_in_std) for p in found.nominal) < 3.0
 
 
 @pytest.mark.slow

@@ -16,14 +16,8 @@ from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.explaining import Question, explained
 from bench.discrepancy.articulated.naming import ranking_of
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
-from bench.discrepancy.articulated_judgement.judgement import (
-    Judge,
-    alike,
-    keys_of,
-    noise_floor,
-    predict,
-    simplest,
-)
+from bench.discrepancy.articulated_judgement.judgement import Judge, alike, keys_of, simplest
+from bench.discrepancy.articulated_judgement.predicted_errors import noise_floor, predict
 from bench.discrepancy.articulated_judgement.whiteness import astray
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.placements import placements

@@ -17,7 +17,7 @@ from bench.discrepancy.articulated.diagnosis import diagnose_articulated
 from bench.discrepancy.articulated.next_test import beyond
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
 from bench.discrepancy.articulated_judgement.free_runs import FreeRuns
-from bench.discrepancy.articulated_judgement.judgement import predict
+from bench.discrepancy.articulated_judgement.predicted_errors import predict
 from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.placements import placements

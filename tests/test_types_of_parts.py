@@ -14,15 +14,9 @@ from test_articulated_rounds import rubbing
 from bench.discrepancy import read_case
 from bench.discrepancy.articulated.naming import model_numbers
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
-from bench.discrepancy.articulated_judgement.judgement import (
-    Judge,
-    keys_of,
-    ladder,
-    noise_floor,
-    predict,
-    simplest,
-)
+from bench.discrepancy.articulated_judgement.judgement import Judge, keys_of, ladder, simplest
 from bench.discrepancy.articulated_judgement.judgement import alike as alike_in
+from bench.discrepancy.articulated_judgement.predicted_errors import noise_floor, predict
 from bench.discrepancy.articulated_search.joint_rounds import round_of
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.search import nominal_fit, steps

@@ -21,7 +21,7 @@ from bench.discrepancy.articulated.next_test import JointProposal, Trajectory, p
 from bench.discrepancy.articulated.places import matrix_of
 from bench.discrepancy.articulated.stepping import accurate, stepped
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
-from bench.discrepancy.articulated_judgement.judgement import predict
+from bench.discrepancy.articulated_judgement.predicted_errors import predict
 from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.placements import placements

@@ -25,15 +25,13 @@ from bench.discrepancy.articulated_judgement.judgement import (
     EffectKeys,
     Judge,
     Kept,
-    PredictedErrors,
     alike,
-    better,
     kept,
     ladder,
-    predict,
     simplest,
     without_each,
 )
+from bench.discrepancy.articulated_judgement.predicted_errors import PredictedErrors, better, predict
 from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.articulated_judgement.whiteness import Astray, Coloured, astray, coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
@@ -42,6 +40,8 @@ from bench.discrepancy.articulated_search.search import (
     complete,
     predecessors,
     search,
+    taken_out,
+    takes_the_place,
 )
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 from bench.discrepancy.verdict import Verdict
@@ -144,10 +144,10 @@ def _explained(
             climbed = other
     standing = _Standing(judge, [*fits, *climbed.fits], climbed, stated=question.stated)
     standing.settle(candidates)
-    left, predicted = standing.left, standing.predicted
+    left = standing.left
     verdict = verdict_of(
         problem, standing.fits, standing.rungs, judge.predict(None, standing.floor), standing.predictions,
-        [None if rest is None else predicted(rest) for rest in without_each(standing.fits, standing.final)], judged, rng,
+        standing.without(), judged, rng,
         whole=left.whole, left=left_of(problem, standing.final, left.coloured, left.astray), alike=standing.near,
     )  # fmt: skip
     return Explained(
@@ -191,6 +191,22 @@ class _Standing:
         if found not in self._known:
             self._known[found] = self.judge.predict(found, self.floor)
         return self._known[found]
+
+    def without(self) -> list[PredictedErrors | None]:
+        """What the explanation predicts without one effect after the other: fitted without it, None where it never was.
+
+        A number in the place of a nominal parameter that is not believed is taken out with that as it was stated: fitted without the
+        number, the parameter would take its place.
+        """
+        final, out = self.final, list[PredictedErrors | None]()
+        for k, (placed, fitted) in enumerate(
+            zip(final.hypothesis, without_each(self.fits, final), strict=True)
+        ):
+            before = fitted or next(rung for rung in reversed(self.rungs) if len(rung.hypothesis) <= k)
+            in_its_place = placed.effect.number and takes_the_place(self.problem, before, final)
+            rest = taken_out(self.problem, final, (placed,)) if in_its_place else fitted
+            out.append(None if rest is None else self.predicted(rest))
+        return out
 
     def settle(self, candidates: Sequence[PlacedOnJoint]) -> None:
         """Go over to the plainest of what predicts as well where something is left, and drop what closes nothing beside the others."""

@@ -8,10 +8,11 @@ from itertools import pairwise
 import numpy as np
 
 from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
-from bench.discrepancy.articulated_judgement.judgement import PredictedErrors, keys_of, without_each
+from bench.discrepancy.articulated_judgement.judgement import keys_of, without_each
+from bench.discrepancy.articulated_judgement.predicted_errors import PredictedErrors
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import exchanged, shortened, steps
+from bench.discrepancy.articulated_search.search import exchanged, shortened, steps, takes_the_place
 from bench.discrepancy.multibody.nominal_parameters import twins
 
 
@@ -23,7 +24,8 @@ def without_the_idle(
 ) -> ArticulatedFit:
     """An explanation without effects that another one has made idle: fitted without one, the judging records are left no larger.
 
-    Only what was fitted anyway is asked, and no effect at parts of one type, which the others of its kind bear out.
+    Only what was fitted anyway is asked, and no effect at parts of one type, which the others of its kind bear out, nor a number without
+    which a nominal parameter is where it is not believed.
 
     Args:
         problem: Records for identification.
@@ -37,7 +39,13 @@ def without_the_idle(
 
     while len(final.hypothesis) > 1:
         rests = zip(final.hypothesis, without_each(fits, final), strict=True)
-        asked = [rest for p, rest in rests if rest is not None and not twins(problem.nominal, p.joint)]
+        asked = [
+            rest
+            for placed, rest in rests
+            if rest is not None
+            and not twins(problem.nominal, placed.joint)
+            and not takes_the_place(problem, rest, final)
+        ]
         best = min(asked, key=left, default=None)
         if best is None or left(best) > left(final):
             return final

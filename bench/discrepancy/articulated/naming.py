@@ -8,12 +8,11 @@ import numpy as np
 
 from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
 from bench.discrepancy.articulated_effects.hypothesis import placed_values
-from bench.discrepancy.articulated_judgement.judgement import (
-    EffectKeys,
+from bench.discrepancy.articulated_judgement.judgement import EffectKeys, keys_of
+from bench.discrepancy.articulated_judgement.predicted_errors import (
     PredictedErrors,
     closed,
     closed_of_nominal,
-    keys_of,
 )
 from bench.discrepancy.articulated_judgement.whiteness import Astray, Coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bench.arrays import Array
-from bench.discrepancy.articulated_judgement.judgement import PredictedErrors, runs_of
+from bench.discrepancy.articulated_judgement.predicted_errors import PredictedErrors, runs_of
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.settings import ArticulatedSettings

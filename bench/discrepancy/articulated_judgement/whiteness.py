@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.arrays import Array
-from bench.discrepancy.articulated_judgement.judgement import PredictedErrors, runs_of
+from bench.discrepancy.articulated_judgement.predicted_errors import PredictedErrors, runs_of
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.numerics.threads import in_threads

@@ -180,6 +180,23 @@ def _eased(
     return best if len(best.hypothesis) > len(current.hypothesis) else None
 
 
+def takes_the_place(problem: ArticulatedProblem, before: ArticulatedFit, after: ArticulatedFit) -> bool:
+    """Whether a fit names a number instead of a nominal parameter that no judgement believes, and is likelier by it.
+
+    Args:
+        problem: Records and priors.
+        before: A fit without that number.
+        after: The fit.
+    """
+    settings = problem.settings.articulated
+    beyond = settings.judgement.strained
+    eased = strained(problem, before, beyond) - strained(problem, after, beyond)
+    known = {placed.key for placed in before.hypothesis}
+    added = [placed for placed in after.hypothesis if placed.key not in known]
+    likelier = after.log_posterior - before.log_posterior >= settings.search.worth
+    return likelier and any(p.effect.number and eased.intersection(p.joints) for p in added)
+
+
 def _open(
     current: ArticulatedFit,
     candidates: Sequence[PlacedOnJoint],
@@ -236,6 +253,13 @@ def shortened(
     """A fit once more without some of its effects."""
     hypothesis, start = _without(problem, found, dropped)
     return refitted(problem, hypothesis, start, scale=ArticulatedFit.at(problem, hypothesis, start).scale)
+
+
+def taken_out(
+    problem: ArticulatedProblem, found: ArticulatedFit, dropped: Collection[PlacedOnJoint]
+) -> ArticulatedFit:
+    """A fit without some of its effects, all else as it is: not fitted."""
+    return ArticulatedFit.at(problem, *_without(problem, found, dropped))
 
 
 def exchanged(
