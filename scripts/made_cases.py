@@ -25,5 +25,10 @@ MADE = {
         GRADED.format("ptz vee scar hop dsk gan", "second-robots/cases"),
         "python scripts/second_robots.py out/second-robots/cases out/second-robots/answers",
     ),
+    "third_robots": (
+        "Cases of a third author, who knew nothing of the diagnosis: robots",
+        GRADED.format("boom gantry hung pal slide", "third-robots/cases"),
+        "python scripts/third_robots.py out/third-robots/cases out/third-robots/answers",
+    ),
 }
 """By name: title of the capability, its command, and the command that makes its cases."""

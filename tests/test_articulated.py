@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.application.applying import Findings, apply
+from bench.discrepancy.articulated import held_inputs
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
 from bench.discrepancy.articulated.naming import ranking_of
@@ -173,6 +175,35 @@ def test_what_was_left_out_is_named_at_its_place(tmp_path, name):
     write_report(found, tmp_path / "report.html")
     write_rerun(found, tmp_path / "run.rrd")
     assert wanted[0] in (tmp_path / "report.html").read_text()
+
+
+def test_a_hold_is_preferred_to_short_delays_that_do_little_beyond_it(monkeypatch):
+    class Judge:
+        settings = JudgementSettings()
+
+        def __init__(self, *of):
+            pass
+
+        def predict(self, found, floor):
+            return found
+
+    def errors(left):
+        return PredictedErrors(np.full((8, 1), left), np.zeros(1), np.ones(1))
+
+    def explained(log_posterior, free, left):
+        final = SimpleNamespace(
+            log_posterior=log_posterior, hypothesis=[SimpleNamespace(effect=SimpleNamespace(free=free))]
+        )
+        return SimpleNamespace(final=final, predictions=[errors(left)], problem=None, judging=None)
+
+    monkeypatch.setattr(held_inputs, "Judge", Judge)
+    delays, without = explained(30.0, 3, 0.010), errors(0.1)
+    assert held_inputs.does_as_well(
+        explained(0.0, 1, 0.013), delays, without
+    )  # of 0.09 less than a twentieth
+    assert not held_inputs.does_as_well(explained(0.0, 1, 0.020), delays, without)
+    assert not held_inputs.does_as_well(explained(0.0, 3, 0.013), delays, without)  # no plainer
+    assert held_inputs.does_as_well(explained(31.0, 3, 0.020), delays, without)  # likelier
 
 
 @pytest.mark.slow

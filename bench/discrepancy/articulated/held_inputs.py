@@ -26,8 +26,8 @@ HELD = (
 )
 
 
-class Reading(NamedTuple):
-    """Another reading of the inputs that is worth a search.
+class HeldInputs(NamedTuple):
+    """Inputs read as held from sample to sample, where that is worth a search.
 
     Attributes:
         case: The case, its inputs held from sample to sample.
@@ -38,7 +38,7 @@ class Reading(NamedTuple):
     without: ArticulatedFit
 
 
-def read_as_held(case: Case, found: Explained) -> Reading | None:
+def read_as_held(case: Case, found: Explained) -> HeldInputs | None:
     """The inputs held from sample to sample, where that is worth another search.
 
     It is where nobody says how they are to be read, and the hold by itself explains more of what the delays and lags of less than a
@@ -59,7 +59,7 @@ def read_as_held(case: Case, found: Explained) -> Reading | None:
     by_hold = shortened(asked_as(problem, other.softened(problem.softness)), final, late).log_posterior
     without = shortened(problem, final, late)
     explains_most = by_hold - without.log_posterior > final.log_posterior - by_hold
-    return Reading(held, without) if explains_most else None
+    return HeldInputs(held, without) if explains_most else None
 
 
 def does_as_well(held: Explained, found: Explained, without: ArticulatedFit) -> bool:

@@ -1,0 +1,80 @@
+"""Write ten cases of robots by a third author, integrated apart from the bench and from MuJoCo, and the answers to them.
+
+    python scripts/third_robots.py CASES ANSWERS
+    python scripts/third_robots.py CASES ANSWERS --only boom-2 gantry-1
+    python scripts/measured_cases.py boom gantry hung pal slide --cases CASES
+
+The robots are a boom like an excavator's, a gantry with a wrist, a leg hung at its hip, a palletiser and a SCARA robot with a slide, two
+cases each. CASES gets a folder for each case (`nominal.json`, `model.xml`, three records) and the acceptance.json by which
+`measured_cases.py` grades; ANSWERS gets a JSON file for each case, which is kept from the diagnosis. Equations of motion, friction, drives
+and sensors are those of the package `third_robots_cases`. MuJoCo only checks mass matrices and bias forces of the nominal models; the
+largest difference is printed. All cases take about ten minutes of one core.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from third_robots_cases.cases import robot_cases  # noqa: E402
+from third_robots_cases.making import MadeRobotCase, make, write  # noqa: E402
+from third_robots_cases.mjcf import against_mujoco  # noqa: E402
+
+from bench.errors import UnknownNameError  # noqa: E402
+from bench.files import write_text  # noqa: E402
+
+
+@dataclass(frozen=True)
+class Args:
+    """Write the cases and their answers."""
+
+    cases: tyro.conf.Positional[Path]
+    """Folder for the cases."""
+    answers: tyro.conf.Positional[Path]
+    """Folder for the answers."""
+    only: tuple[str, ...] = ()
+    """Names of cases; all where none is given."""
+    seed: int = 0
+    """Added to the seed of each case; 0 gives the cases that README.md describes."""
+
+
+def told(made: MadeRobotCase) -> str:
+    """Sizes of the effects by joint, a line for each record."""
+    lines = []
+    for record, size in made.sizes.items():
+        parts = (("main", size.main), ("main/noise", size.main_over_noise), ("background", size.background))
+        lines.append(f"    {record}: {', '.join(f'{name} {_short(row)}' for name, row in parts if row)}\n")
+    return "".join(lines)
+
+
+def _short(row: Iterable[float]) -> str:
+    return " ".join(f"{x:.3g}" for x in row)
+
+
+def main() -> int:
+    """Make the cases one after another."""
+    args = tyro.cli(Args, description=__doc__)
+    known = robot_cases()
+    for name in args.only:
+        if name not in known:
+            raise UnknownNameError("case", name, known)
+    rules = Path(__file__).parent / "third_robots_cases" / "acceptance.json"
+    write_text(args.cases / "acceptance.json", rules.read_text(encoding="utf-8"))
+    for name in args.only or known:
+        made = make(known[name], args.seed)
+        write(made, args.cases, args.answers)
+        difference = against_mujoco(made.case.robot, made.case.drive)
+        print(f"{name}: {made.case.kind}; mass matrix and bias differ from MuJoCo's by {difference:.1e}")
+        print(told(made), end="", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
