@@ -31,6 +31,7 @@ from bench.discrepancy.articulated_search.search import (
     predecessors,
     shortened,
     steps,
+    taken_out,
     takes_the_place,
 )
 from bench.discrepancy.multibody.nominal_parameters import twins
@@ -119,7 +120,7 @@ def kept(judge: Judge, fits: Sequence[ArticulatedFit]) -> Kept:
     floor = judge.noise_floor(rungs[-1])
     while True:
         predictions = [judge.predict(rung, floor) for rung in rungs]
-        last, doubtful = _climbed(judge.judging, rungs, predictions, settings)
+        last, doubtful = _climbed(judge, rungs, predictions)
         for placed in doubtful:
             shorter = shortened(problem, rungs[last], (placed,))
             found.append(shorter)
@@ -141,10 +142,7 @@ def kept(judge: Judge, fits: Sequence[ArticulatedFit]) -> Kept:
 
 
 def _climbed(
-    problem: ArticulatedProblem,
-    rungs: Sequence[ArticulatedFit],
-    predictions: Sequence[PredictedErrors],
-    settings: JudgementSettings,
+    judge: Judge, rungs: Sequence[ArticulatedFit], predictions: Sequence[PredictedErrors]
 ) -> tuple[int, list[PlacedOnJoint]]:
     """How many steps of a ladder the judging records bear out, and which effects did not improve when they were added.
 
@@ -152,10 +150,11 @@ def _climbed(
     asked about that joint, or it stands in for something else. What it leaves of a joint is less than the joint moves: a run that is
     further off than no motion at all has explained nothing, however much worse it was before.
     A number that is named instead of a nominal parameter that is not believed predicts as that does, held back as far as is believed; it
-    stays unless it predicts worse.
+    stays if it predicts no worse than that and better than what was stated.
     What is complete gets no more but what is certain, and nothing small is added where even then something is left: it stands in for a
     little of the form of the law that is not right. What takes away all but as small a part of what was left is no such thing.
     """
+    problem, settings = judge.judging, judge.settings
     last, waiting, doubtful = 0, list[PlacedOnJoint](), list[PlacedOnJoint]()
     # of a torque, a law that is off by a part leaves the square of it; what it makes of a free run piles up
     least_part = settings.small**2 if isinstance(problem, TorqueProblem) else settings.small
@@ -173,12 +172,31 @@ def _climbed(
         least = max(left if last else 0.0, small * float(np.mean(first.excess)))
         follows = bool(np.all(after.discrepancy < 1.0))
         borne_out = gained > least and better(before, after, settings)
-        instead = takes_the_place(problem, rungs[last], rungs[k]) and not better(after, before, settings)
-        if follows and (borne_out or instead):
+        if follows and (
+            borne_out or _instead(judge, rungs[last], rungs[k], predictions[last], predictions[k])
+        ):
             last, doubtful, waiting = k, [*doubtful, *waiting], []
         else:
             waiting += added
     return last, doubtful
+
+
+def _instead(
+    judge: Judge,
+    fit: ArticulatedFit,
+    further: ArticulatedFit,
+    before: PredictedErrors,
+    after: PredictedErrors,
+) -> bool:
+    """Whether a number in the place of a nominal parameter stays, from two fits and what they predict."""
+    known = keys_of(fit)
+    numbers = tuple(p for p in further.hypothesis if p.effect.number and p.key not in known)
+    at = judge.judging.reached(numbers)
+    then, now = before.of(at), after.of(at)
+    if not takes_the_place(judge.problem, fit, further) or better(now, then, judge.settings):
+        return False
+    stated = judge.predict(taken_out(judge.problem, further, numbers), after.floor)
+    return better(stated.of(at), now, judge.settings)
 
 
 def without_each(fits: Sequence[ArticulatedFit], final: ArticulatedFit) -> list[ArticulatedFit | None]:
