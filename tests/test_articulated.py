@@ -17,7 +17,7 @@ from bench.discrepancy.application.applying import Findings, apply
 from bench.discrepancy.articulated import held_inputs
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
-from bench.discrepancy.articulated.naming import ranking_of
+from bench.discrepancy.articulated.naming import closed_by_numbers, ranking_of
 from bench.discrepancy.articulated.next_test import propose
 from bench.discrepancy.articulated.recognition import applies
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
@@ -38,6 +38,7 @@ from bench.discrepancy.precheck.checking import check
 from bench.discrepancy.replay.verification import replay_of
 from bench.discrepancy.report.html_page import write_report
 from bench.discrepancy.report.rerun_recording import write_rerun
+from bench.discrepancy.verdict import Gap
 from bench.errors import BenchError
 from bench.rig.gravity import tilted
 
@@ -175,6 +176,13 @@ def test_what_was_left_out_is_named_at_its_place(tmp_path, name):
     write_report(found, tmp_path / "report.html")
     write_rerun(found, tmp_path / "run.rrd")
     assert wanted[0] in (tmp_path / "report.html").read_text()
+
+
+def test_what_numbers_close_by_themselves_is_not_told_of_the_effects_alone():
+    gap = Gap("", 0.5, 0.1, 0.05, 0.03, 0.99, (0.9, 1.0))
+    # (0.25 - 0.01) / (0.25 - 0.0009)
+    assert "estimated anew, close 96.3 % by themselves" in closed_by_numbers([gap], 0.99)
+    assert closed_by_numbers([replace(gap, parameters_only=0.4)], 0.99) == ""
 
 
 def test_a_hold_is_preferred_to_short_delays_that_do_little_beyond_it(monkeypatch):

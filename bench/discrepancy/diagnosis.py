@@ -47,7 +47,16 @@ from bench.discrepancy.prediction.run_on import rest_of_records
 from bench.discrepancy.search.explanation import Explanation, nominal_alone
 from bench.discrepancy.search.load_interpolation import reading_notes
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings, changed
-from bench.discrepancy.verdict import Gap, NamedEffect, Ranked, Verdict, VerdictKind, far_off, of_runs
+from bench.discrepancy.verdict import (
+    Gap,
+    NamedEffect,
+    Ranked,
+    Verdict,
+    VerdictKind,
+    far_off,
+    of_runs,
+    widest_of,
+)
 from bench.errors import BenchError, UnknownNameError
 
 _Placed = TypeVar("_Placed", NamedEffect, Ranked)
@@ -188,7 +197,7 @@ def _diagnose(case: Case, how: How, rng: np.random.Generator, anyway: bool) -> D
     progress("gap on the judging records")
     closest = finding.closest or evidence.nearest(explanations)
     final, closure, found = shrunk(case, problem, explanations, kind, rival, rng, closest)
-    widest = max(found, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
+    widest = widest_of(found)
     if kind == "unknown" and not finding.doubt and closest.hypothesis:
         words += evidence.closes(names(closest.hypothesis), widest, settings=how.settings.judgement)
     where = locate(

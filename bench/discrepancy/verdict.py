@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal, NamedTuple
 
@@ -200,6 +200,11 @@ class Gap:
     steps: tuple[tuple[str, float], ...] = ()
     dof: str = ""
     free_runs: tuple[float, ...] = ()
+
+
+def widest_of(gaps: Sequence[Gap]) -> Gap:
+    """The gap that stands furthest out of its noise."""
+    return max(gaps, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
 
 
 def of_runs(gap: Gap) -> tuple[float, float, float]:

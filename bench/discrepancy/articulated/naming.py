@@ -30,6 +30,7 @@ from bench.discrepancy.verdict import (
     Verdict,
     VerdictKind,
     by_name,
+    widest_of,
 )
 
 
@@ -80,7 +81,7 @@ def verdict_of(
     )
     effects = tuple(sorted(effects, key=lambda e: -e.closed))
     gaps = gaps_of(problem, rungs, untouched, predictions, rng)
-    widest = max(gaps, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
+    widest = widest_of(gaps)
     return Verdict(
         verdict=kind,
         named=effects if kind == "effect" else (),
@@ -141,7 +142,8 @@ def _words(
             f"Missing from the model: {names}. With it the records are explained to within their noise."
             if whole
             else (
-                f"Missing from the model: {names}, which closes {100.0 * explained:.3g} % of the discrepancy on the judging records.{left}"
+                f"Missing from the model: {names}, which closes {100.0 * explained:.3g} % of the discrepancy on the judging records"
+                f"{closed_by_numbers(gaps, explained)}.{left}"
             )
         )
     if effects:
@@ -157,6 +159,21 @@ def _words(
         share = 100.0 * (1.0 - after / before)
         keep = f" Its own numbers, estimated from the other records, close {share:.3g} % of the discrepancy by themselves."
     return f"Something is missing from the model, and no effect of the catalogue improves on the judging records.{left}{keep}"
+
+
+def closed_by_numbers(gaps: Sequence[Gap], explained: float) -> str:
+    """What the model's own numbers, estimated anew, close of the widest gap, in words; none where that is not most of what is closed.
+
+    Args:
+        gaps: Of the judged coordinates.
+        explained: Part of the widest one that is closed in all.
+    """
+    gap = widest_of(gaps)
+    noise = gap.noise_floor**2
+    alone = (gap.before**2 - gap.parameters_only**2) / max(gap.before**2 - noise, 1e-300)
+    if alone < 0.5 * explained:
+        return ""
+    return f", of which the model's own numbers, estimated anew, close {100.0 * min(alone, explained):.3g} % by themselves"
 
 
 def left_of(
