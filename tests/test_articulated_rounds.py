@@ -142,8 +142,13 @@ def test_what_showed_nothing_when_it_was_added_is_taken_out_again(tmp_path):
     assert told.fits
 
 
-@pytest.mark.parametrize(("other", "kept_names"), [(0.9, {"b"}), (1.1, {"a", "b"})])
-def test_what_another_effect_has_made_idle_goes(monkeypatch, other, kept_names):
+@pytest.mark.parametrize(
+    ("other", "in_place", "kept_names"),
+    [(0.9, False, {"b"}), (1.1, False, {"a", "b"}), (0.9, True, {"a", "b"})],
+)
+def test_what_another_effect_has_made_idle_goes_but_for_a_number_in_the_place_of_a_parameter(
+    monkeypatch, other, in_place, kept_names
+):
     """Fitted without it, the judging records are left no larger; what was never fitted without is not asked."""
     a, b = (SimpleNamespace(key=(name, "elbow"), joint=0) for name in "ab")
     fits = [
@@ -152,6 +157,7 @@ def test_what_another_effect_has_made_idle_goes(monkeypatch, other, kept_names):
     ]
     left = {frozenset("ab"): 1.0, frozenset("b"): other}
     monkeypatch.setattr(further_fits, "twins", lambda nominal, joint: set())
+    monkeypatch.setattr(further_fits, "takes_the_place", lambda *asked: in_place)
 
     def predicted(found):
         return SimpleNamespace(excess=np.array([left[frozenset(p.key[0] for p in found.hypothesis)]]))

@@ -169,8 +169,7 @@ def closed_by_numbers(gaps: Sequence[Gap], explained: float) -> str:
         explained: Part of the widest one that is closed in all.
     """
     gap = widest_of(gaps)
-    noise = gap.noise_floor**2
-    alone = (gap.before**2 - gap.parameters_only**2) / max(gap.before**2 - noise, 1e-300)
+    alone = (gap.before**2 - gap.parameters_only**2) / max(gap.before**2 - gap.noise_floor**2, 1e-300)
     if alone < 0.5 * explained:
         return ""
     return f", of which the model's own numbers, estimated anew, close {100.0 * min(alone, explained):.3g} % by themselves"

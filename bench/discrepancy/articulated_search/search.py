@@ -188,13 +188,15 @@ def takes_the_place(problem: ArticulatedProblem, before: ArticulatedFit, after: 
         before: A fit without that number.
         after: The fit.
     """
+    known = {placed.key for placed in before.hypothesis}
+    numbers = [p for p in after.hypothesis if p.effect.number and p.key not in known]
+    if not numbers:
+        return False
     settings = problem.settings.articulated
     beyond = settings.judgement.strained
     eased = strained(problem, before, beyond) - strained(problem, after, beyond)
-    known = {placed.key for placed in before.hypothesis}
-    added = [placed for placed in after.hypothesis if placed.key not in known]
     likelier = after.log_posterior - before.log_posterior >= settings.search.worth
-    return likelier and any(p.effect.number and eased.intersection(p.joints) for p in added)
+    return likelier and any(eased.intersection(placed.joints) for placed in numbers)
 
 
 def _open(
