@@ -63,7 +63,7 @@ def read_as_held(case: Case, found: Explained) -> HeldInputs | None:
 
 
 def does_as_well(held: Explained, found: Explained, without: ArticulatedFit) -> bool:
-    """Whether an explanation of held inputs is likelier than another, or plainer and as good but for a small part.
+    """Whether an explanation of held inputs is likelier than another, or plainer and as good but for a small part; both in runs or torques.
 
     The hold is one cause for all motors, delays are one for each. They are a little better for it where the logged inputs are noisy: half
     a sample late, straight lines are the mean of two samples, and a lag is that of more. So what they close of the judging records
@@ -74,10 +74,12 @@ def does_as_well(held: Explained, found: Explained, without: ArticulatedFit) -> 
         found: What explains them with straight lines between the samples.
         without: The same fitted without its short delays.
     """
+    if type(held.problem) is not type(found.problem):  # one by runs, one by torques
+        return False
     if held.final.log_posterior >= found.final.log_posterior:
         return True
     free = [sum(placed.effect.free for placed in each.final.hypothesis) for each in (held, found)]
-    judge = Judge(found.problem, found.judging)
+    judge = Judge(found.problem, asked_as(found.problem, found.judging))
     none = judge.predict(without, found.predictions[-1].floor)
     left = [float(np.mean(each.excess)) for each in (held.predictions[-1], found.predictions[-1], none)]
     return free[0] < free[1] and left[0] - left[1] <= judge.settings.small * (left[2] - left[1])
