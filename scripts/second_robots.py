@@ -17,7 +17,6 @@ two joints.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,24 +25,16 @@ import tyro
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from second_robots_cases.cases import robot_cases  # noqa: E402
+from robot_case_sets import SetArgs, shown, write_set  # noqa: E402
+from second_robots_cases.cases import RobotCase, robot_cases  # noqa: E402
 from second_robots_cases.making import MadeRobotCase, make, write  # noqa: E402
 from second_robots_cases.mjcf import against_mujoco  # noqa: E402
 
-from bench.errors import UnknownNameError  # noqa: E402
-from bench.files import write_text  # noqa: E402
-
 
 @dataclass(frozen=True)
-class Args:
+class Args(SetArgs):
     """Write the cases and their answers."""
 
-    cases: tyro.conf.Positional[Path]
-    """Folder for the cases."""
-    answers: tyro.conf.Positional[Path]
-    """Folder for the answers."""
-    only: tuple[str, ...] = ()
-    """Names of cases; all where none is given."""
     seed: int = 990417
     """Of the deviations, the motions and the noise."""
 
@@ -54,30 +45,22 @@ def told(made: MadeRobotCase) -> str:
     for record, size in made.sizes.items():
         if size is not None:
             parts = (("gap", size.gap), ("background/main", size.background), ("main/noise", size.over_noise))
-            shown = ", ".join(f"{name} {_short(row)}" for name, row in parts if row)
-            lines.append(f"    {record}: {shown}\n")
+            lines.append(f"    {record}: {', '.join(f'{name} {shown(row)}' for name, row in parts if row)}\n")
     return "".join(lines)
-
-
-def _short(row: Iterable[float | None]) -> str:
-    return " ".join("-" if x is None else f"{x:.3g}" for x in row)
 
 
 def main() -> int:
     """Make the cases one after another."""
     args = tyro.cli(Args, description=__doc__)
-    known = robot_cases()
-    for name in args.only:
-        if name not in known:
-            raise UnknownNameError("case", name, known)
-    right = Path(__file__).parent / "second_robots_cases" / "acceptance.json"
-    write_text(args.cases / "acceptance.json", right.read_text(encoding="utf-8"))
-    for name in args.only or known:
-        made = make(known[name], args.seed)
+
+    def written(case: RobotCase) -> str:
+        made = make(case, args.seed)
         write(made, args.cases, args.answers)
-        difference = against_mujoco(made.case.robot)
-        print(f"{name}: {made.case.kind}; mass matrix and bias differ from MuJoCo's by {difference:.1e}")
-        print(told(made), end="", flush=True)
+        difference = against_mujoco(case.robot)
+        return f"{case.kind}; mass matrix and bias differ from MuJoCo's by {difference:.1e}\n{told(made)}"
+
+    rules = Path(__file__).parent / "second_robots_cases" / "acceptance.json"
+    write_set(robot_cases(), only=args.only, rules=rules, cases=args.cases, write=written)
     return 0
 
 

@@ -14,7 +14,6 @@ largest difference is printed. All cases take about ten minutes of one core.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,24 +22,16 @@ import tyro
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from third_robots_cases.cases import robot_cases  # noqa: E402
+from robot_case_sets import SetArgs, shown, write_set  # noqa: E402
+from third_robots_cases.cases import RobotCase, robot_cases  # noqa: E402
 from third_robots_cases.making import MadeRobotCase, make, write  # noqa: E402
 from third_robots_cases.mjcf import against_mujoco  # noqa: E402
 
-from bench.errors import UnknownNameError  # noqa: E402
-from bench.files import write_text  # noqa: E402
-
 
 @dataclass(frozen=True)
-class Args:
+class Args(SetArgs):
     """Write the cases and their answers."""
 
-    cases: tyro.conf.Positional[Path]
-    """Folder for the cases."""
-    answers: tyro.conf.Positional[Path]
-    """Folder for the answers."""
-    only: tuple[str, ...] = ()
-    """Names of cases; all where none is given."""
     seed: int = 0
     """Added to the seed of each case; 0 gives the cases that README.md describes."""
 
@@ -50,29 +41,22 @@ def told(made: MadeRobotCase) -> str:
     lines = []
     for record, size in made.sizes.items():
         parts = (("main", size.main), ("main/noise", size.main_over_noise), ("background", size.background))
-        lines.append(f"    {record}: {', '.join(f'{name} {_short(row)}' for name, row in parts if row)}\n")
+        lines.append(f"    {record}: {', '.join(f'{name} {shown(row)}' for name, row in parts if row)}\n")
     return "".join(lines)
-
-
-def _short(row: Iterable[float]) -> str:
-    return " ".join(f"{x:.3g}" for x in row)
 
 
 def main() -> int:
     """Make the cases one after another."""
     args = tyro.cli(Args, description=__doc__)
-    known = robot_cases()
-    for name in args.only:
-        if name not in known:
-            raise UnknownNameError("case", name, known)
-    rules = Path(__file__).parent / "third_robots_cases" / "acceptance.json"
-    write_text(args.cases / "acceptance.json", rules.read_text(encoding="utf-8"))
-    for name in args.only or known:
-        made = make(known[name], args.seed)
+
+    def written(case: RobotCase) -> str:
+        made = make(case, args.seed)
         write(made, args.cases, args.answers)
-        difference = against_mujoco(made.case.robot, made.case.drive)
-        print(f"{name}: {made.case.kind}; mass matrix and bias differ from MuJoCo's by {difference:.1e}")
-        print(told(made), end="", flush=True)
+        difference = against_mujoco(case.robot, case.drive)
+        return f"{case.kind}; mass matrix and bias differ from MuJoCo's by {difference:.1e}\n{told(made)}"
+
+    rules = Path(__file__).parent / "third_robots_cases" / "acceptance.json"
+    write_set(robot_cases(), only=args.only, rules=rules, cases=args.cases, write=written)
     return 0
 
 

@@ -201,10 +201,15 @@ class Gap:
     dof: str = ""
     free_runs: tuple[float, ...] = ()
 
+    @property
+    def over_noise(self) -> float:
+        """What the nominal model misses over what noise alone leaves."""
+        return self.before / max(self.noise_floor, 1e-12)
+
 
 def widest_of(gaps: Sequence[Gap]) -> Gap:
     """The gap that stands furthest out of its noise."""
-    return max(gaps, key=lambda gap: gap.before / max(gap.noise_floor, 1e-12))
+    return max(gaps, key=lambda gap: gap.over_noise)
 
 
 def of_runs(gap: Gap) -> tuple[float, float, float]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import mujoco
 import numpy as np
+from robot_case_sets import differences_from_mujoco
 
+from bench.arrays import Array
 from second_robots_cases.dynamics import bias_force, mass_matrix, pose_of
 from second_robots_cases.plant import nominal_plant
 from second_robots_cases.robots import Link, Robot, Servo
@@ -66,20 +67,12 @@ def _actuator(link: Link) -> str:
 
 
 def against_mujoco(robot: Robot, *, states: int = 5) -> float:
-    """Largest difference of mass matrix [kg m^2 or kg] and bias [N m or N] from MuJoCo's, over random states of the nominal model."""
-    model = mujoco.MjModel.from_xml_string(mjcf(robot))
-    data, plant, rng = mujoco.MjData(model), nominal_plant(robot), np.random.default_rng(0)
-    worst = 0.0
-    for _ in range(states):
-        data.qpos[:], data.qvel[:] = rng.normal(size=model.nq), rng.normal(size=model.nv)
-        mujoco.mj_forward(model, data)
-        theirs = np.zeros((model.nv, model.nv))
-        for j, unit in enumerate(np.eye(model.nv)):
-            column = np.zeros(model.nv)
-            mujoco.mj_mulM(model, data, column, unit)
-            theirs[:, j] = column
-        pose = pose_of(data.qpos.copy(), plant.chain)
-        ours = mass_matrix(plant.chain, pose) + np.diag(plant.drives.armature)
-        bias = bias_force(data.qvel.copy(), plant.chain, pose)
-        worst = max(worst, float(np.abs(ours - theirs).max()), float(np.abs(bias - data.qfrc_bias).max()))
-    return worst
+    """Largest difference of mass matrix and bias of the nominal model from MuJoCo's, see `differences_from_mujoco`."""
+    plant = nominal_plant(robot)
+
+    def dynamics(q: Array, v: Array) -> tuple[Array, Array]:
+        pose = pose_of(q, plant.chain)
+        matrix = mass_matrix(plant.chain, pose) + np.diag(plant.drives.armature)
+        return matrix, bias_force(v, plant.chain, pose)
+
+    return differences_from_mujoco(mjcf(robot), dynamics, states=states)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import mujoco
 import numpy as np
+from robot_case_sets import differences_from_mujoco
 
+from bench.arrays import Array
 from third_robots_cases.dynamics import (
     GRAVITY,
     joint_forces,
@@ -68,23 +69,15 @@ def _actuator(link: Link, drive: Drive) -> str:
 
 
 def against_mujoco(robot: Robot, drive: Drive, *, states: int = 5) -> float:
-    """Largest difference of mass matrix [kg m^2 or kg] and bias [N m or N] from MuJoCo's, over random states of the nominal model."""
-    model = mujoco.MjModel.from_xml_string(mjcf(robot, drive))
-    data, plant, rng = mujoco.MjData(model), nominal_plant(robot, drive), np.random.default_rng(0)
-    n = len(robot.links)
-    placed, moved, ours, bias = room_to_place(n), room_to_move(n), np.zeros((n, n)), np.zeros(n)
-    worst = 0.0
-    for _ in range(states):
-        data.qpos[:], data.qvel[:] = rng.normal(size=n), rng.normal(size=n)
-        mujoco.mj_forward(model, data)
-        theirs = np.zeros((n, n))
-        for j, unit in enumerate(np.eye(n)):
-            column = np.zeros(n)
-            mujoco.mj_mulM(model, data, column, unit)
-            theirs[:, j] = column
-        place(data.qpos.copy(), plant.chain, placed)
-        mass_matrix(plant.chain, placed, moved, ours)
-        joint_forces(data.qvel.copy(), np.zeros(n), GRAVITY, plant.chain, placed, moved, bias)
-        difference = ours + np.diag(plant.drives.armature) - theirs
-        worst = max(worst, float(np.abs(difference).max()), float(np.abs(bias - data.qfrc_bias).max()))
-    return worst
+    """Largest difference of mass matrix and bias of the nominal model from MuJoCo's, see `differences_from_mujoco`."""
+    plant, n = nominal_plant(robot, drive), len(robot.links)
+    placed, moved = room_to_place(n), room_to_move(n)
+
+    def dynamics(q: Array, v: Array) -> tuple[Array, Array]:
+        links, bias = np.zeros((n, n)), np.zeros(n)
+        place(q, plant.chain, placed)
+        mass_matrix(plant.chain, placed, moved, links)
+        joint_forces(v, np.zeros(n), GRAVITY, plant.chain, placed, moved, bias)
+        return links + np.diag(plant.drives.armature), bias
+
+    return differences_from_mujoco(mjcf(robot, drive), dynamics, states=states)

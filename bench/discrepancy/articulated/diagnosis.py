@@ -15,7 +15,7 @@ import numpy as np
 
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.explaining import Explained, Question, asked_as, explained
-from bench.discrepancy.articulated.held_inputs import HELD, does_as_well, read_as_held
+from bench.discrepancy.articulated.held_inputs import HELD, explained_as_held
 from bench.discrepancy.articulated.naming import closest_rival
 from bench.discrepancy.articulated.next_test import JointProposal, Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
@@ -123,14 +123,10 @@ def diagnose_articulated(
 
     found = asked(case)
     steps_kept = all(a.step == b.step for a, b in zip(told.identification, case.identification, strict=True))
-    held = read_as_held(case, found) if steps_kept else None  # of samples that were thinned none was held
-    if held is not None and deadline.allows(
-        once_more := "once more, the inputs read as held between their samples"
-    ):
-        progress(once_more)
-        other = asked(held.case)
-        if does_as_well(other, found, held.without):
-            case, found, notes = held.case, other, (*notes, HELD)
+    # of samples that were thinned none was held
+    held = explained_as_held(case, found, asked, progress) if steps_kept else None
+    if held is not None:
+        found, notes = held, (*notes, HELD)
     problem, fits, final, verdict = found.problem, found.fits, found.final, found.verdict
     notes = (*notes, *_of_long_records(told, whole, found), *_followed(problem), *deadline.untried)
     verdict = replace(verdict.in_haste() if deadline.skipped else verdict, settings=changed(settings))
@@ -141,7 +137,7 @@ def diagnose_articulated(
         verdict = replace(verdict, next_excitation=proposal.told)
     verdict = verdict.timed(time.perf_counter() - began)
     return ArticulatedDiagnosis(
-        case, model, problem, found.judging, tuple(fits), final, matrix_of(problem, fits), verdict,
+        problem.case, model, problem, found.judging, tuple(fits), final, matrix_of(problem, fits), verdict,
         None if proposal is None else proposal.trajectory,
     )  # fmt: skip
 

@@ -6,6 +6,7 @@ samples, its records ask for a short delay or lag at each; read as held, for not
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -24,6 +25,27 @@ HELD = (
     "inputs are read as held from sample to sample, which explains the records without delays of less than a sample; state "
     '"load_interpolation": "zero_order_hold" if they were'
 )
+
+ONCE_MORE = "once more, the inputs read as held between their samples"
+
+
+def explained_as_held(
+    case: Case, found: Explained, asked: Callable[[Case], Explained], progress: Callable[[str], None]
+) -> Explained | None:
+    """What explains the records with their inputs held from sample to sample, where that does as well; None where it does not.
+
+    Args:
+        case: The case, its inputs read as straight lines.
+        found: What explains it so.
+        asked: Explains a case.
+        progress: Called with a line of text at every stage.
+    """
+    reading = read_as_held(case, found)
+    if reading is None or not found.problem.deadline.allows(ONCE_MORE):
+        return None
+    progress(ONCE_MORE)
+    held = asked(reading.case)
+    return held if does_as_well(held, found, reading.without) else None
 
 
 class HeldInputs(NamedTuple):

@@ -173,7 +173,7 @@ def _climbed(
         follows = bool(np.all(after.discrepancy < 1.0))
         borne_out = gained > least and better(before, after, settings)
         if follows and (
-            borne_out or _instead(judge, rungs[last], rungs[k], predictions[last], predictions[k])
+            borne_out or _stays_instead(judge, rungs[last], rungs[k], predictions[last], predictions[k])
         ):
             last, doubtful, waiting = k, [*doubtful, *waiting], []
         else:
@@ -181,7 +181,7 @@ def _climbed(
     return last, doubtful
 
 
-def _instead(
+def _stays_instead(
     judge: Judge,
     fit: ArticulatedFit,
     further: ArticulatedFit,

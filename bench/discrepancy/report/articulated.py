@@ -145,7 +145,7 @@ def _how_far(out: Page, diagnosis: ArticulatedDiagnosis, runs: Mapping[str, Reco
             for g in diagnosis.verdict.gaps
         ],
     )
-    worst = sorted(diagnosis.verdict.gaps, key=lambda g: -g.before / max(g.noise_floor, 1e-12))
+    worst = sorted(diagnosis.verdict.gaps, key=lambda gap: -gap.over_noise)
     names = [g.dof for g in worst[: SETTINGS.shown_joints]]
     section.plots(
         [histories(runs, names), histories(runs, names, errors=True)],
