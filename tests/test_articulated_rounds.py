@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,7 +21,7 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitte
 from bench.discrepancy.articulated_search.misfit import Octaves, transformed
 from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
-from bench.discrepancy.articulated_search.search import nominal_fit, search
+from bench.discrepancy.articulated_search.search import exchanged, nominal_fit, search
 from bench.discrepancy.multibody.model import ArticulatedModel
 
 
@@ -49,6 +50,26 @@ def test_a_number_that_no_judgement_believes_is_named_instead_of_what_it_hides(t
     named = {placed.key: placed.effect.values(eta, placed.scales) for placed, eta in pairs}
     assert named["force_gain_error", "shoulder_drive"]["relative_error"] == pytest.approx(-0.26, abs=0.03)
     assert named["coulomb_friction", "elbow"]["limit"] == pytest.approx(LIMIT, rel=0.1)
+
+
+def test_friction_in_the_place_of_another_law_begins_as_large_as_the_records_say(tmp_path):
+    """Expected twenty times as large, it holds the joint; a fit does not find back from there."""
+    small = 0.03
+    folder = write_case(tmp_path, mjcf(servo=False, friction=small), servo=False)
+    case, compiled, _ = admitted_robot(read_case(folder))
+    problem = ArticulatedProblem.of(case, ArticulatedModel.of(compiled), case.identification)
+    laws = {p.effect.name: p for p in placements(problem, CATALOGUE) if p.where == "elbow"}
+    rich, dry = laws["stribeck_friction"], laws["coulomb_friction"]
+    (limit,) = dry.effect.parameters
+    expected = replace(limit, mean=limit.mean + 2.0)  # a logarithm
+    dry = replace(dry, effect=replace(dry.effect, parameters=(expected,)))
+    nominal = nominal_fit(problem)
+    begin = [rich.effect.parameters[0].mean - 1.0, *(p.mean for p in rich.effect.parameters[1:])]
+    found = refitted(problem, (rich,), np.append(nominal.vector, begin), scale=nominal.scale)
+    plain = exchanged(problem, found, (rich,), (dry,))
+    (eta,) = problem.etas(plain.hypothesis, plain.vector)
+    assert dry.effect.values(eta, dry.scales)["limit"] == pytest.approx(small, rel=0.1)
+    assert plain.log_posterior > nominal.log_posterior
 
 
 def octaves(n: float, samples: float) -> Octaves:

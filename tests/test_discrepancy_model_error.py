@@ -230,6 +230,26 @@ def test_what_few_blocks_leave_open_is_weighed_however_far_its_posterior_is_behi
     assert weighed(all_blocks, one_block) == ["cubic_stiffness"]  # none beyond one that is told
 
 
+def test_what_no_noise_explains_is_not_the_nominal_model_alone(monkeypatch):
+    """Blocks prefer a spring that the judging records bear out, by less than what it takes to be described."""
+    case = planted_case(lambda f: motion_with(f, lambda x, v, z: (8e5 * x**3, [])), n=600)
+    problem = problem_of(case, crude_error(case, structure_of(case)))
+    spring, nothing = explanation(problem, "cubic_stiffness"), explanation(problem)
+    scores = {spring: np.zeros(12), nothing: np.full(12, 0.6)}
+    module = "bench.discrepancy.judgement.finalists"
+    monkeypatch.setattr(f"{module}.held_out", lambda e: HeldOut(e, scores[e]))
+    monkeypatch.setattr(f"{module}.bounded", lambda e, within: e)
+    trusted, doubted = (
+        judge(case, problem, [spring, nothing], np.random.default_rng(0), trusted=believed)
+        for believed in (True, False)
+    )
+    assert trusted.weights.tolist() == [1.0, 0.0]
+    assert doubted.weights[0] < 0.5
+    for told in (trusted, doubted):  # whichever is likelier, what kind of thing it is does not stay open
+        assert told.chosen.explanation is spring
+        assert told.agreed == pytest.approx(1.0)
+
+
 def test_what_accounts_for_all_that_another_effect_leaves_is_named_beside_it():
     """A stop at the edge of resonance makes so large a discrepancy that friction closes a small part of it."""
 
@@ -331,7 +351,7 @@ def test_a_family_is_as_likely_as_what_has_an_effect_of_it():
     found = tuple(HeldOut(explanation(problem, *names), np.ones(12)) for names in rivals)
     known = Discrepancies(problem.case, problem)
     weights = np.array([0.2, 0.25, 0.3, 0.15, 0.1])
-    for chosen, agreed in ((0, 0.45), (2, 0.45), (3, 0.45), (4, 0.0)):
+    for chosen, agreed in ((0, 0.5), (2, 0.5), (3, 0.5), (4, 0.0)):
         told = Judged(
             found[chosen],
             found,

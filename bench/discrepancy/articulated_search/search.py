@@ -29,6 +29,7 @@ from bench.discrepancy.articulated_search.rounds import (
     sound,
     strained,
 )
+from bench.discrepancy.articulated_search.screening import by_effect, screen
 from bench.discrepancy.multibody.nominal_parameters import twins
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
@@ -270,11 +271,24 @@ def exchanged(
     lost: Collection[PlacedOnJoint],
     gained: Sequence[PlacedOnJoint],
 ) -> ArticulatedFit:
-    """A fit once more with some of its effects exchanged for others."""
-    others, start = _without(problem, found, lost)
-    start = np.append(start, [p.mean for placed in gained for p in placed.effect.parameters])
-    hypothesis = (*others, *gained)
-    return refitted(problem, hypothesis, start, scale=ArticulatedFit.at(problem, hypothesis, start).scale)
+    """A fit once more with some of its effects exchanged for others.
+
+    Those begin as large as a screening on top of what stays says, or as large as is expected of them, whichever fits better: a friction
+    that is expected much larger than it is holds a joint that moves, and a fit does not find back from there.
+    """
+    rest, stays = _without(problem, found, lost)
+    hypothesis = (*rest, *gained)
+    screened = {
+        mine[0].placed.key: mine[0].eta
+        for mine in by_effect(screen(problem, ArticulatedFit.at(problem, rest, stays), gained), 1)
+    }
+    expected = {p.key: np.array([q.mean for q in p.effect.parameters]) for p in gained}
+    begins = [
+        ArticulatedFit.at(problem, hypothesis, np.concatenate([stays, *(etas[p.key] for p in gained)]))
+        for etas in (expected, expected | screened)
+    ]
+    begin = min(begins, key=lambda f: float(f.misfit.sum()) + _surprise(problem, f))
+    return refitted(problem, hypothesis, begin.vector, scale=begin.scale)
 
 
 def _surprise(problem: ArticulatedProblem, found: ArticulatedFit) -> float:

@@ -71,16 +71,14 @@ class Judged:
 
     @property
     def agreed(self) -> float:
-        """Probability of the likeliest kind among those of what was chosen, as if one of the explanations were true."""
-        weights = [
-            sum(
-                float(weight)
-                for weight, entry in zip(self.weights, self.found, strict=True)
-                if kind in kinds_of(entry.explanation)
-            )
+        """Probability of the likeliest kind among those of what was chosen, as if one of the explanations that have effects were true."""
+        pairs = [(float(w), kinds_of(e.explanation)) for w, e in zip(self.weights, self.found, strict=True)]
+        any_kind = sum(weight for weight, kinds in pairs if kinds)
+        of_kind = (
+            sum(weight for weight, kinds in pairs if kind in kinds)
             for kind in kinds_of(self.chosen.explanation)
-        ]
-        return max(weights, default=0.0)
+        )
+        return max(of_kind, default=0.0) / max(any_kind, 1e-300)
 
 
 def kinds_of(explanation: Explanation) -> set[str]:
@@ -127,6 +125,9 @@ def judge(
             break
         vetoed = True
     weights = shares(found, _log_priors(found), rng, judgement.held_out.draws)
+    if trusted and chosen is not nothing:  # more than noise is missing, and small things are in the doubts
+        weights = np.where([entry is nothing for entry in found], 0.0, weights)
+        weights = weights / weights.sum()
     # a nominal model is as right as a model can be within two standard deviations of what sensors are calibrated to
     error = problem.settings.likelihood.error
     off = float(np.max(known.of(nothing.explanation, judging=True))) > 2.0 * error.least
