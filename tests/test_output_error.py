@@ -101,6 +101,25 @@ def test_free_structure_and_element_parameters_enter_as_in_a_rebuilt_rig(rng):
     np.testing.assert_allclose(found, expected, atol=1e-10 * np.max(np.abs(expected)))
 
 
+WHEEL = """<mujoco><option gravity="0 0 0" timestep="0.001" integrator="RK4"/><worldbody><body name="wheel">
+<joint name="mesh" axis="0 0 1" stiffness="390" damping="0.14"/><inertial pos="0 0 0" mass="5" diaginertia="0.008 0.009 0.0117"/></body>
+</worldbody><actuator><motor name="exciter" joint="mesh"/></actuator><sensor><jointpos name="twist" joint="mesh"/></sensor></mujoco>"""
+
+
+def test_an_inertia_is_that_about_the_hinge_whatever_the_others_are(rng):
+    rig, name, heavier = Rig("wheel", WHEEL), "structure/inertia/wheel", 1.03 * 0.0117
+    assert current(rig, name) == pytest.approx(0.0117)
+    moved = rig.with_structure(inertia={"wheel": heavier})
+    np.testing.assert_allclose(moved.model.body_inertia[1], 1.03 * np.array([0.008, 0.009, 0.0117]))
+    record = simulate(moved, {"exciter": rng.standard_normal(800)})
+    found = LinearRig.of(rig, ["twist"], [name]).simulate(record["exciter"][:, None], [heavier])
+    scale = np.max(np.abs(record["twist"]))
+    np.testing.assert_allclose(found[:, 0], record["twist"], atol=1e-10 * scale)
+    for engine in ("linear", "mujoco"):
+        fitted = fit_output_error(rig, [record], free=[name], engine=engine)
+        assert fitted.parameters[name] == pytest.approx(heavier, rel=1e-6)
+
+
 def test_controlled_error_follows_the_analytic_free_decay():
     m, c, k, v0 = 2.0, 3.0, 900.0, 1.0
     rig = LinearRig.of(sdof_rig(mass=m, damping=c, stiffness=k, timestep=0.02), ["displacement"])

@@ -12,7 +12,7 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from bench import native
-from bench.campaign.addresses import Address, Source, sources_of, structure_address
+from bench.campaign.addresses import Source, sources_of
 from bench.campaign.alternatives import ElementPlan, RigPlan
 from bench.campaign.distribution import Value
 from bench.campaign.drawing import RecordDraw
@@ -26,6 +26,7 @@ from bench.rig import Element, Rig
 from bench.rig.configuration import rig_from_configuration
 from bench.rig.drives import Initial, controls_of
 from bench.rig.library import PRESCRIBED_ACTUATORS, prescribe, starting
+from bench.rig.structure import Address, structure_address
 from bench.signals import Excitation, Signal
 
 
@@ -92,8 +93,7 @@ class Variant:
                 batch.bind("act")[:, item.act : item.act + len(start)] = start
         for address, column in self.structure:
             values = np.array([draw.values[column] for draw in draws], dtype=float)
-            target = batch.expand(address.field)[:, address.index]
-            target[:] = values.reshape((-1,) + (1,) * (target.ndim - 1))
+            address.write_each(batch.expand(address.field), values)
         if self.structure:
             batch.set_const()
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from bench import native
 from bench.arrays import Array
 from bench.errors import ModelError
-from bench.identification.parameter_address import ParameterAddress
 from bench.rig import Rig
+from bench.rig.structure import Address
 
 
 @dataclass(frozen=True)
@@ -122,11 +122,6 @@ class Probe:
         return ""
 
 
-def value_of(model: mujoco.MjModel, entry: ParameterAddress) -> float:
-    """Value of a parameter in a model."""
-    return float(np.ravel(getattr(model, entry.field)[entry.index])[0])
-
-
 def refuse_nonlinear(rig: Rig, model: mujoco.MjModel) -> None:
     """Raise `ModelError` where a probe at a few states could miss that the rig is not linear."""
     slides = (int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE))
@@ -154,18 +149,16 @@ def refuse_nonlinear(rig: Rig, model: mujoco.MjModel) -> None:
             )
 
 
-def moved(
-    model: mujoco.MjModel, entries: Sequence[ParameterAddress], values: Sequence[float]
-) -> mujoco.MjModel:
+def moved(model: mujoco.MjModel, entries: Sequence[Address], values: Sequence[float]) -> mujoco.MjModel:
     """A copy of a model with other values of some parameters."""
     changed = copy.copy(model)
     for entry, value in zip(entries, values, strict=True):
-        getattr(changed, entry.field)[entry.index] = value
+        entry.write(changed, value)
     mujoco.mj_setConst(changed, mujoco.MjData(changed))
     return changed
 
 
-def slope_of(model: mujoco.MjModel, base: Matrices, entry: ParameterAddress, value: float) -> Matrices:
+def slope_of(model: mujoco.MjModel, base: Matrices, entry: Address, value: float) -> Matrices:
     """Change of the matrices with a unit of a structural quantity, which they are affine in."""
     change = value if value != 0.0 else 1.0
     away = Probe(moved(model, [entry], [value + change])).matrices()
@@ -175,7 +168,7 @@ def slope_of(model: mujoco.MjModel, base: Matrices, entry: ParameterAddress, val
 def matrices_at(
     model: mujoco.MjModel,
     base: Matrices,
-    addresses: Sequence[ParameterAddress],
+    addresses: Sequence[Address],
     start: Array,
     slopes: Sequence[Matrices | None],
     factor: float,

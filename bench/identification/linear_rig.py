@@ -30,7 +30,6 @@ from bench.identification.linear_probe import (
     refuse_nonlinear,
     rows_and_columns,
     slope_of,
-    value_of,
 )
 from bench.identification.linear_rig_elements import channel_columns, element_table, reached_coordinates
 from bench.identification.parameter_address import address
@@ -41,7 +40,7 @@ from bench.rig import Rig
 
 def current(rig: Rig, name: str) -> float:
     """Value of a free parameter in a rig; raises as `address`."""
-    return value_of(rig.model, address(rig, name))
+    return address(rig, name).value(rig.model)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +87,7 @@ class LinearRig:
         bare = rig.with_(elements=()).model
         refuse_nonlinear(rig, bare)
         structural = [entry.field != "numeric_data" for entry in addresses]
-        start = np.array([value_of(rig.model, entry) for entry in addresses])
+        start = np.array([entry.value(rig.model) for entry in addresses])
         base = Probe(bare).matrices()
         slopes = tuple(
             slope_of(bare, base, entry, value) if free else None

@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import mujoco
-
 from bench.errors import ParameterError, UnknownNameError
 from bench.rig import Rig
-from bench.rig.building import STRUCTURE
+from bench.rig.structure import STRUCTURE, Address, structure_address
 
 
-class ParameterAddress(NamedTuple):
-    """Where a free parameter stands in a compiled model: ``getattr(model, field)[index]``."""
-
-    field: str
-    index: int
-
-
-def address(rig: Rig, name: str) -> ParameterAddress:
+def address(rig: Rig, name: str) -> Address:
     """Find a free parameter in the compiled model.
 
     Args:
@@ -31,7 +20,10 @@ def address(rig: Rig, name: str) -> ParameterAddress:
     """
     first, _, rest = name.partition("/")
     if first == "structure" and "/" in rest:
-        return _structural(rig.model, *rest.split("/", 1))
+        kind, target = rest.split("/", 1)
+        if kind == "frictionloss":
+            raise UnknownNameError("structural quantity", kind, [k for k in STRUCTURE if k != kind])
+        return structure_address(rig.model, kind, target)
     label, _, parameter = name.rpartition("/")
     element = rig.element(label)
     if element.exact:
@@ -40,29 +32,4 @@ def address(rig: Rig, name: str) -> ParameterAddress:
         raise UnknownNameError(f"parameter of element '{label}'", parameter, element.law.parameter_names)
     item = next(item for item in rig.built.placed if item.element.name == label)
     place = len(element.law.header) + element.law.parameter_names.index(parameter)
-    return ParameterAddress("numeric_data", item.theta + place)
-
-
-def _structural(model: mujoco.MjModel, kind: str, name: str) -> ParameterAddress:
-    kinds = mujoco.mjtObj
-    if kind not in STRUCTURE or kind == "frictionloss":
-        raise UnknownNameError(
-            "structural quantity", kind, [entry for entry in STRUCTURE if entry != "frictionloss"]
-        )
-    if kind in {"mass", "inertia"}:
-        body = mujoco.mj_name2id(model, kinds.mjOBJ_BODY, name)
-        if body < 0:
-            raise UnknownNameError("body", name, [model.body(i).name for i in range(1, model.nbody)])
-        return ParameterAddress(f"body_{kind}", body)
-    joint = mujoco.mj_name2id(model, kinds.mjOBJ_JOINT, name)
-    if joint >= 0:
-        if kind == "stiffness":
-            return ParameterAddress("jnt_stiffness", joint)
-        return ParameterAddress(f"dof_{kind}", int(model.jnt_dofadr[joint]))
-    tendon = mujoco.mj_name2id(model, kinds.mjOBJ_TENDON, name)
-    if tendon < 0:
-        joints = [model.joint(i).name for i in range(model.njnt)]
-        raise UnknownNameError(
-            "joint or tendon", name, joints + [model.tendon(i).name for i in range(model.ntendon)]
-        )
-    return ParameterAddress(f"tendon_{kind}", tendon)
+    return Address("numeric_data", item.theta + place)

@@ -79,8 +79,7 @@ class MujocoEngine:
         model = self.rig.model
         batch = Batch(model, len(vectors), self.threads)
         for entry, values in zip(self.addresses, vectors.T, strict=True):
-            target = batch.expand(entry.field)[:, entry.index]
-            target[:] = values.reshape((-1,) + (1,) * (target.ndim - 1))
+            entry.write_each(batch.expand(entry.field), values)
         if any(entry.field != "numeric_data" for entry in self.addresses):
             batch.set_const()
         batch.bind("time")[:] = record.start_time

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Protocol, get_args
+from typing import NamedTuple, Protocol
 from xml.etree import ElementTree
 
 import mujoco
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from bench import native
 from bench.errors import ModelError, ParameterError, UnknownNameError
-from bench.mjcf import StructureName
 from bench.native import Coordinate
 from bench.rig.element import Element
 from bench.rig.mjcf_files import included_files
+from bench.rig.structure import structure_address
 
 INTEGRATORS = {
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -25,8 +25,6 @@ INTEGRATORS = {
     "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
     "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
 }
-STRUCTURE: tuple[str, ...] = get_args(StructureName)
-"""Structural quantities that `Rig.with_structure` changes."""
 
 
 @dataclass(frozen=True)
@@ -246,24 +244,4 @@ def _check_targets(spec: mujoco.MjSpec, rig: Buildable, element: Element) -> Non
 def _set_structure(model: mujoco.MjModel, kind: str, name: str, value: float) -> None:
     if not np.isfinite(value) or (value < 0.0 and kind != "stiffness") or (value == 0.0 and kind == "mass"):
         raise ParameterError(f"{kind} of '{name}' is {value}; a finite, positive value is expected")
-    if kind in {"mass", "inertia"}:
-        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-        if body < 0:
-            raise UnknownNameError("body", name, [model.body(i).name for i in range(1, model.nbody)])
-        getattr(model, f"body_{kind}")[body] = value
-        return
-    joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
-    if joint >= 0:
-        dof = model.jnt_dofadr[joint]
-        if kind == "stiffness":
-            model.jnt_stiffness[joint] = value
-        else:
-            getattr(model, f"dof_{kind}")[dof] = value
-        return
-    tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name)
-    if tendon < 0:
-        known = [model.joint(i).name for i in range(model.njnt)] + [
-            model.tendon(i).name for i in range(model.ntendon)
-        ]
-        raise UnknownNameError("joint or tendon", name, known)
-    getattr(model, f"tendon_{kind}")[tendon] = value
+    structure_address(model, kind, name).write(model, value)

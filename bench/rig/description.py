@@ -13,10 +13,11 @@ import numpy as np
 
 from bench.errors import ModelError, ParameterError, UnknownNameError
 from bench.recording import Channel
-from bench.rig.building import INTEGRATORS, STRUCTURE, Built, build, parse, specify
+from bench.rig.building import INTEGRATORS, Built, build, parse, specify
 from bench.rig.channels import rig_channels
 from bench.rig.element import Element
 from bench.rig.mjcf_files import mjcf_text
+from bench.rig.structure import STRUCTURE
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +91,8 @@ class Rig:
         """A copy with other masses, stiffnesses, … in the model itself.
 
         Args:
-            **values: One of mass [kg], inertia [kg m^2] (all three principal moments) by body; stiffness, damping,
-                frictionloss, armature by joint or (the first three) tendon.
+            **values: One of mass [kg], inertia [kg m^2] (about the axis of its hinge, through its centre of mass) by body; stiffness,
+                damping, frictionloss, armature by joint or (the first three) tendon.
 
         Example:
             >>> rig = Rig("slide", "<mujoco>…</mujoco>").with_structure(mass={"carriage": 2.0}, damping={"carriage": 1.5})

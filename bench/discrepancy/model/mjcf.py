@@ -44,7 +44,7 @@ from bench.discrepancy.settings import DiagnosisSettings, ModelSettings
 from bench.errors import ModelError, UnknownNameError
 from bench.identification.linear_rig import LinearRig, current
 from bench.rig import Rig
-from bench.rig.building import STRUCTURE
+from bench.rig.structure import STRUCTURE
 
 
 def mjcf_structure(case: Case, *, settings: DiagnosisSettings) -> Structure:

@@ -122,7 +122,7 @@ def _with_more(rig: Rig, name: str) -> mujoco.MjModel:
     """The model with a unit more of a parameter."""
     entry = address(rig, name)
     model = copy.copy(rig.model)
-    getattr(model, entry.field)[entry.index] += 1.0
+    entry.write(model, entry.value(model) + 1.0)
     return model
 
 
