@@ -17,9 +17,10 @@ from bench.discrepancy.application.applying import Findings, apply
 from bench.discrepancy.articulated import held_inputs
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.diagnosis import ArticulatedDiagnosis
-from bench.discrepancy.articulated.naming import closed_by_numbers, ranking_of
+from bench.discrepancy.articulated.naming import ranking_of
 from bench.discrepancy.articulated.next_test import propose
 from bench.discrepancy.articulated.recognition import applies
+from bench.discrepancy.articulated.words import closed_where
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
 from bench.discrepancy.articulated_judgement.free_runs import FreeRuns
 from bench.discrepancy.articulated_judgement.judgement import JudgementSettings
@@ -181,8 +182,15 @@ def test_what_was_left_out_is_named_at_its_place(tmp_path, name):
 def test_what_numbers_close_by_themselves_is_not_told_of_the_effects_alone():
     gap = Gap("", 0.5, 0.1, 0.05, 0.03, 0.99, (0.9, 1.0))
     # (0.25 - 0.01) / (0.25 - 0.0009)
-    assert "estimated anew, close 96.3 % by themselves" in closed_by_numbers([gap], 0.99)
-    assert closed_by_numbers([replace(gap, parameters_only=0.4)], 0.99) == ""
+    assert closed_where([gap], [gap]) == (
+        "99 % of the discrepancy on the judging records, of which the model's own numbers, estimated anew, close 96.3 % by themselves"
+    )
+    # of a joint that is set right by numbers nothing is told where an effect acts on another
+    other = replace(gap, before=0.3, parameters_only=0.29, after=0.04, closed=0.9, dof="elbow")
+    assert (
+        closed_where([gap, other], [other])
+        == "90 % of the discrepancy of joint 'elbow' on the judging records"
+    )
 
 
 def test_a_hold_is_preferred_to_short_delays_that_do_little_beyond_it(monkeypatch):

@@ -19,7 +19,8 @@ from bench.discrepancy.articulated.further_fits import (
     without_some,
     without_the_idle,
 )
-from bench.discrepancy.articulated.naming import left_of, verdict_of
+from bench.discrepancy.articulated.naming import verdict_of
+from bench.discrepancy.articulated.words import left_of
 from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_judgement.judgement import (
     EffectKeys,

@@ -1,4 +1,4 @@
-"""The verdict on an articulated model: names with parameters and shares, rivals, probabilities, and the sentences that say it."""
+"""The verdict on an articulated model: names with parameters and shares, rivals and probabilities."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
+from bench.discrepancy.articulated.words import words_of
 from bench.discrepancy.articulated_effects.hypothesis import placed_values
 from bench.discrepancy.articulated_judgement.judgement import EffectKeys, keys_of
 from bench.discrepancy.articulated_judgement.predicted_errors import (
@@ -14,7 +15,6 @@ from bench.discrepancy.articulated_judgement.predicted_errors import (
     closed,
     closed_of_nominal,
 )
-from bench.discrepancy.articulated_judgement.whiteness import Astray, Coloured
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.judgement.doubt import outside
@@ -23,13 +23,11 @@ from bench.discrepancy.multibody.nominal_parameters import Nominal
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.verdict import (
     Estimate,
-    Gap,
     NamedEffect,
     NominalEstimate,
     Ranked,
     Verdict,
     VerdictKind,
-    by_name,
     widest_of,
 )
 
@@ -81,7 +79,7 @@ def verdict_of(
     )
     effects = tuple(sorted(effects, key=lambda e: -e.closed))
     gaps = gaps_of(problem, rungs, untouched, predictions, rng)
-    widest = widest_of(gaps)
+    acted_on = [gaps[j] for j in problem.reached(final.hypothesis)]
     return Verdict(
         verdict=kind,
         named=effects if kind == "effect" else (),
@@ -89,12 +87,10 @@ def verdict_of(
         ranking=ranking,
         indistinguishable=_sets(fits, final, settings, alike) if kind == "effect" else (),
         locations=locations_of(problem, base),
-        gap=widest,
+        gap=widest_of(gaps),
         gaps=gaps,
         probabilities=probabilities,
-        explanation=_words(
-            kind, effects, whole, widest.closed if kind == "effect" else explained, left, gaps
-        ),
+        explanation=words_of(kind, effects, explained, "" if whole else left, gaps, acted_on),
         warnings=(),
         complete=whole,
         remainder=remainder_of(problem, final, predictions[-1], untouched),
@@ -120,86 +116,6 @@ def _shares(
         )
         out.append(closed(before, after, predictions[0], rng))
     return out
-
-
-def _words(
-    kind: VerdictKind,
-    effects: Sequence[NamedEffect],
-    whole: bool,
-    explained: float,
-    left: str,
-    gaps: Sequence[Gap],
-) -> str:
-    few = len(effects) <= 3
-    names = " and ".join(f"{e.name} ({e.where})" for e in effects) if few else by_name(effects)
-    left = "" if whole else f" {left}"
-    if kind == "none":
-        return (
-            "The stated uncertainties and the noise explain the records; nothing is missing from the model."
-        )
-    if kind == "effect":
-        return (
-            f"Missing from the model: {names}. With it the records are explained to within their noise."
-            if whole
-            else (
-                f"Missing from the model: {names}, which closes {100.0 * explained:.3g} % of the discrepancy on the judging records"
-                f"{closed_by_numbers(gaps, explained)}.{left}"
-            )
-        )
-    if effects:
-        return (
-            f"Something is missing from the model, and no effect of the catalogue closes most of it; the nearest is {names}, "
-            f"with {100.0 * explained:.3g} %.{left}"
-        )
-    keep = ""
-    before, after = (sum(getattr(gap, end) ** 2 for gap in gaps) for end in ("before", "after"))
-    if after > before:
-        keep = " Its own numbers, estimated from the other records, leave more of these than as stated: keep what is stated."
-    elif after < before:
-        share = 100.0 * (1.0 - after / before)
-        keep = f" Its own numbers, estimated from the other records, close {share:.3g} % of the discrepancy by themselves."
-    return f"Something is missing from the model, and no effect of the catalogue improves on the judging records.{left}{keep}"
-
-
-def closed_by_numbers(gaps: Sequence[Gap], explained: float) -> str:
-    """What the model's own numbers, estimated anew, close of the widest gap, in words; none where that is not most of what is closed.
-
-    Args:
-        gaps: Of the judged coordinates.
-        explained: Part of the widest one that is closed in all.
-    """
-    gap = widest_of(gaps)
-    alone = (gap.before**2 - gap.parameters_only**2) / max(gap.before**2 - gap.noise_floor**2, 1e-300)
-    if alone < 0.5 * explained:
-        return ""
-    return f", of which the model's own numbers, estimated anew, close {100.0 * min(alone, explained):.3g} % by themselves"
-
-
-def left_of(
-    problem: ArticulatedProblem, final: ArticulatedFit, left: Coloured | None, lost: Astray | None
-) -> str:
-    """What a fit leaves, in words.
-
-    Args:
-        problem: Records for identification.
-        final: The fit.
-        left: What it leaves of a motion beside noise in the judging records, if anything.
-        lost: A joint whose free runs in them go astray, if any.
-    """
-    if lost is not None:
-        return (
-            f"Joint '{problem.joints[lost.joint].name}' is still {lost.error:.3g} off in free runs, {lost.times:.3g} times what noise and "
-            "the uncertainty of the parameters leave: something more is missing, or the noise is larger than stated."
-        )
-    j = int(np.argmax(final.reduced))
-    times, where = float(np.sqrt(final.reduced[j])), ""
-    if left is not None:
-        j, times = left.joint, float(np.sqrt(left.power))
-        where = f" below {left.below:.3g} Hz in '{left.record}'"
-    return (
-        f"Joint '{problem.joints[j].name}' still leaves {times:.3g} times its noise{where}: "
-        "something more is missing, or the noise is larger than stated."
-    )
 
 
 def _probabilities(
