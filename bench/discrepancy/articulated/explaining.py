@@ -149,7 +149,8 @@ def _explained(
     verdict = verdict_of(
         problem, standing.fits, standing.rungs, judge.predict(None, standing.floor), standing.predictions,
         standing.without(), judged, rng,
-        whole=left.whole, left=left_of(problem, standing.final, left.coloured, left.astray), alike=standing.near,
+        whole=left.whole, noise_alone=left.noise_alone,
+        left=left_of(problem, standing.final, left.coloured, left.astray), alike=standing.near,
     )  # fmt: skip
     return Explained(
         problem, judging, standing.fits, standing.final, standing.predictions, verdict, standing.near
@@ -240,10 +241,11 @@ class _Standing:
 
 
 class _Left(NamedTuple):
-    """What an explanation leaves of the judging records, and whether that is noise alone."""
+    """What an explanation leaves of the judging records, whether that looks like noise alone, and is no more than was stated."""
 
     coloured: Coloured | None
     astray: Astray | None
+    noise_alone: bool
     whole: bool
 
 
@@ -256,7 +258,7 @@ def _left(judge: Judge, final: ArticulatedFit, predicted: PredictedErrors, *, st
     # power above the noise at some frequencies shows that what is named is not all; where nothing is named it is no evidence that
     # something is missing, which takes an effect that predicts the judging records better
     noise_alone = lost is None and (left is None or not final.hypothesis) and complete(problem, final, judged)
-    return _Left(left, lost, noise_alone and stated and runs)
+    return _Left(left, lost, noise_alone and runs, noise_alone and stated and runs)
 
 
 def _asks_torque(found: Explained) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from bench.discrepancy.articulated.places import gaps_of, locations_of, remainder_of
-from bench.discrepancy.articulated.words import words_of
+from bench.discrepancy.articulated.words import NOISE_UNSTATED, words_of
 from bench.discrepancy.articulated_effects.hypothesis import placed_values
 from bench.discrepancy.articulated_judgement.judgement import EffectKeys, keys_of
 from bench.discrepancy.articulated_judgement.predicted_errors import (
@@ -43,6 +43,7 @@ def verdict_of(
     rng: np.random.Generator,
     *,
     whole: bool,
+    noise_alone: bool,
     left: str,
     alike: Collection[EffectKeys],
 ) -> Verdict:
@@ -57,14 +58,16 @@ def verdict_of(
         without: What the last rung predicts without one of its effects after the other.
         settings: Thresholds.
         rng: For the bootstrap intervals.
-        whole: Whether the last rung leaves nothing but noise.
+        whole: Whether the last rung leaves nothing but the noise that was stated.
+        noise_alone: Whether it leaves what looks like noise, of whatever is taken for its size.
         left: What it leaves, in words.
         alike: Explanations that predict the judging records as well, see `judgement.alike`.
     """
     final, base = rungs[-1], rungs[0]
     explained = closed_of_nominal(untouched, predictions[0], predictions[-1], rng)
     kind: VerdictKind = "effect" if final.hypothesis else "none"
-    if not whole and (not final.hypothesis or explained < settings.material):
+    explains = explained >= settings.material if final.hypothesis else noise_alone
+    if not whole and not explains:
         kind = "unknown"
     shares = _shares(rungs, predictions, without, rng)
     # of what is named beside noise, the part that is left tells how likely something outside the catalogue is
@@ -90,7 +93,9 @@ def verdict_of(
         gap=widest_of(gaps),
         gaps=gaps,
         probabilities=probabilities,
-        explanation=words_of(kind, effects, explained, "" if whole else left, gaps, acted_on),
+        explanation=words_of(
+            kind, effects, explained, "" if whole else NOISE_UNSTATED if noise_alone else left, gaps, acted_on
+        ),
         warnings=(),
         complete=whole,
         remainder=remainder_of(problem, final, predictions[-1], untouched),

@@ -21,7 +21,8 @@ from bench.rig.actuators import DRIVES, commanded
 
 
 def applies(case: Case, *, settings: ArticulatedSettings = DEFAULT.articulated) -> bool:
-    """Whether the rig of a case is an MJCF of several joints with servos, parameters of drives, or inertia that changes with posture."""
+    """Whether the rig of a case is an MJCF of several joints with servos, parameters of drives, or inertia that changes with posture, or
+    one whose joints, each measured and driven on its own, no linear structure describes."""
     path = Path(case.folder or ".") / case.rig
     if case.rig in ("sdof", "joint", "damper") or not path.is_file():
         return False
@@ -33,7 +34,7 @@ def applies(case: Case, *, settings: ArticulatedSettings = DEFAULT.articulated) 
         return False  # refused where the model is read for a diagnosis
     # one joint on its own is a linear structure first: forces on it have a larger catalogue there
     servos = model.nv > 1 and any(commanded(model, u) == "position" for u in range(model.nu))
-    return servos or _posture_matters(model, settings=settings)
+    return servos or _posture_matters(model, settings=settings) or (_bends(model) and drives_only(case))
 
 
 def drives_only(case: Case) -> bool:
@@ -51,6 +52,13 @@ def drives_only(case: Case) -> bool:
     except BenchError:
         return False
     return True
+
+
+def _bends(model: mujoco.MjModel) -> bool:
+    """Whether drives have a past, springs or dampers are polynomials, or what moves is in a medium."""
+    curved = (model.jnt_stiffnesspoly, model.dof_dampingpoly, model.actuator_dampingpoly)
+    medium = model.opt.density > 0.0 or model.opt.viscosity > 0.0
+    return bool(model.na or model.nhistory or medium or any(np.any(coefficients) for coefficients in curved))
 
 
 @native.quiet()

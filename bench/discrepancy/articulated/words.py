@@ -11,6 +11,10 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.verdict import Gap, NamedEffect, VerdictKind, by_name, widest_of
 
+NOISE_UNSTATED = (
+    "What is left looks like the noise that the channels show at high frequencies, whose size nobody stated."
+)
+
 
 def words_of(
     kind: VerdictKind,
@@ -31,6 +35,8 @@ def words_of(
         acted_on: Those of the joints that the effects act on.
     """
     names = " and ".join(f"{e.name} ({e.where})" for e in effects) if len(effects) <= 3 else by_name(effects)
+    if kind == "none" and left:
+        return f"Nothing is missing that the records could tell: no effect of the catalogue improves on the judging records. {left}"
     if kind == "none":
         return (
             "The stated uncertainties and the noise explain the records; nothing is missing from the model."

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from bench.arrays import Array
 from bench.discrepancy.articulated_effects.effect import JointScales
 from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, placed_values
-from bench.discrepancy.articulated_search.misfit import Octaves, transformed
+from bench.discrepancy.articulated_search.innovations import UnknownStart, whitened
+from bench.discrepancy.articulated_search.misfit import Octaves, log_likelihood, transformed
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.body_numbers import BodyNumbers
 from bench.discrepancy.multibody.encoders import Encoder
@@ -61,10 +62,12 @@ class ArticulatedProblem:
     reach: float = np.inf
     nominal: tuple[Nominal, ...] = field(init=False)
     _corrected: MadeOnce[PreparedRecord] = field(init=False)
+    _starts: MadeOnce[UnknownStart] = field(init=False)
 
     def __post_init__(self) -> None:
         self.nominal = nominal_parameters(self.case, self.model)
         self._corrected = MadeOnce(self.settings.articulated.kept_motions * len(self.records))
+        self._starts = MadeOnce(len(self.joints) * len(self.records))
 
     @classmethod
     def of(
@@ -172,21 +175,8 @@ class ArticulatedProblem:
         """
         if all(joint.drive is not None and joint.drive.servo for joint in self.joints):
             return self
-        records = []
-        for prepared in self.records:
-            joints = []
-            for record in prepared.joints:
-                drive = record.joint.drive
-                torque = (
-                    0.0
-                    if drive is None or drive.servo
-                    else level * float(np.std(record.command)) * abs(drive.gear * drive.kp)
-                )
-                joints.append(
-                    replace(record, process=torque, filter=None) if torque > record.process else record
-                )
-            records.append(replace(prepared, joints=tuple(joints)))
-        return replace(self, records=tuple(records), softness=max(level, self.softness))
+        records = tuple(prepared.softened(level) for prepared in self.records)
+        return replace(self, records=records, softness=max(level, self.softness))
 
     def settled(self, hypothesis: JointHypothesis, vector: Array) -> ArticulatedProblem:
         """The same problem about the postures that a fit has: of links of elastic joints, and behind wrong encoders; else itself."""
@@ -282,19 +272,30 @@ class ArticulatedProblem:
         return tuple(i for i, p in enumerate(self.nominal) if p.of_body)
 
     def residuals(self, j: int, hypothesis: JointHypothesis, vector: Array) -> list[Array]:
-        """Whitened, weighted innovations (n, n_measured) of joint `j` in every record."""
+        """Whitened, weighted innovations (n, n_measured) of joint `j` in every record, less what its unknown start makes of them."""
         most, found = self.settings.articulated.diverged, []
         p = self.slots(j, hypothesis, vector, on_link=self.records[0].joints[j].on_link)
         for original, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
             record = prepared.joints[j]
             out, _ = self.run(j, hypothesis, vector, record, record.gain, record.start, None, p)
-            # a corrected log has another noise; residuals are compared in units of what was logged
-            innovation = out[:, : record.n_measured] * (original.joints[j].noise / record.noise)
-            whitened = innovation @ original.joints[j].whitening.T * original.joints[j].weight
-            if not np.isfinite(whitened).all():
-                whitened = np.nan_to_num(whitened, nan=most, posinf=most, neginf=-most)
-            found.append(whitened)
+            left = whitened(original.joints[j], record, out, most)
+            found.append(self.start(j, original).taken_out(left))
         return found
+
+    def start(self, j: int, prepared: PreparedRecord) -> UnknownStart:
+        """What is not known of the start of joint `j` in a record, as the nominal model carries it along."""
+        record, vector = prepared.joints[j], np.zeros(len(self.nominal))
+
+        def from_there(start: Array) -> Array:
+            out, _ = self.run(j, (), vector, record, record.gain, start, None)
+            return whitened(record, record, out, self.settings.articulated.diverged)
+
+        return self._starts.get((j, id(prepared)), lambda: UnknownStart.of(record, from_there))
+
+    def log_likelihood(self, power: Array) -> float:
+        """Log-likelihood of the logs up to a constant that no softness changes, from the (n_joints, n_octaves) sums of squares of a fit."""
+        unknown = sum(self.start(j, r).log_determinant for r in self.records for j in range(len(self.joints)))
+        return log_likelihood(self.records, self.octaves, power) - unknown
 
     def residual(self, j: int, hypothesis: JointHypothesis, vector: Array) -> Array:
         """Their cosine transforms, all records in one (n,); the squares of an octave sum to about its count where nothing is missing."""

@@ -17,7 +17,6 @@ from bench.arrays import Array
 from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.containing import begun_again
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others, fit, own_entries, refitted
-from bench.discrepancy.articulated_search.misfit import log_likelihood
 from bench.discrepancy.articulated_search.periods import beside
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
@@ -165,9 +164,8 @@ def parted(
     """
     if problem.softness or not any(placed.effect.play for placed in corrected.best.hypothesis):
         return False
-    soft = corrected.problem
-    heard = log_likelihood(soft.records, soft.octaves, corrected.best.chi2)
-    told = (log_likelihood(problem.records, problem.octaves, f.chi2) for f in fits)
+    heard = corrected.problem.log_likelihood(corrected.best.chi2)
+    told = (problem.log_likelihood(f.chi2) for f in fits)
     return heard > max(told, default=-np.inf) + settings.worth
 
 

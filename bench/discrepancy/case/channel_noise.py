@@ -5,23 +5,46 @@ A converter of step q leaves the samples on multiples of q, and an error of vari
 
 References:
     B. Widrow, I. Kollar, Quantization Noise, 2008, ch. 4.
+    G. Blom, Statistical Estimates and Transformed Beta-Variables, 1958 (expected order statistics).
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import gamma
 
 from bench.arrays import Array
 from bench.discrepancy.settings import DEFAULT, CaseSettings
 
 
+@dataclass(frozen=True)
+class ChannelNoiseSettings:
+    """Numbers of `bench.discrepancy.case.channel_noise`."""
+
+    parts: int = 8
+    """Parts of the upper half of a spectrum, the flattest of which is taken for noise."""
+    hann: float = 1.94
+    """Ordinates of a periodogram with Hann's window that tell as much as an independent one: the sum of their squared correlations."""
+
+
+SETTINGS = ChannelNoiseSettings()
+
+
 def noise_floor(x: Array) -> float:
-    """White noise of a channel whose noise is not stated, from the flattest quarter of its spectrum."""
+    """White noise of a channel whose noise is not stated, from the flattest eighth of the upper half of its spectrum.
+
+    The least of several means is smaller than what it is a mean of. Ordinates of noise are exponential, so that each mean is one of a gamma
+    distribution, whose least of eight is expected near the quantile of 5 / 66 (Blom): the floor is divided by that.
+    """
     spectrum = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(len(x)))) ** 2 / (len(x) * 0.375)
     upper = spectrum[len(spectrum) // 2 :]
-    blocks = [np.mean(block) for block in np.array_split(upper, 8)]
-    return float(np.sqrt(max(min(blocks), (1e-6 * np.std(x)) ** 2, 1e-300)))
+    blocks = [np.mean(block) for block in np.array_split(upper, SETTINGS.parts)]
+    independent = max(len(upper) / SETTINGS.parts / SETTINGS.hann, 1.0)
+    least = float(gamma.ppf((1.0 - 0.375) / (SETTINGS.parts + 0.25), independent)) / independent
+    return float(np.sqrt(max(min(blocks) / least, (1e-6 * np.std(x)) ** 2, 1e-300)))
 
 
 def quiet_noise(x: Array) -> float:

@@ -21,38 +21,11 @@ from bench.discrepancy.settings import DEFAULT, MotionSettings
 from bench.errors import IdentificationError
 
 
-class KalmanSmootherLimits(NamedTuple):
-    """Numbers of `bench.discrepancy.motion.kalman_smoother` that compiled code holds."""
-
-    start: int = 12
-    """Samples whose slope through the first one starts the velocity."""
-
-
-KALMAN_SMOOTHER_LIMITS = KalmanSmootherLimits()
-
-
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def _filter(y, h, transition, gain, out, predicted):  # noqa: PLR0912  (one compiled loop)
+def _filter(y, h, transition, gain, start, out, predicted):
     n = y.shape[0]
     m = y.shape[1]
-    state = np.zeros(3)
-    for c in range(m):
-        for i in range(3):
-            if h[c, i] == 1.0:
-                state[i] = y[0, c]
-        if h[c, 0] == 1.0:
-            # a record may start in motion: the stationary gains would take long to find its velocity
-            for k in range(1, KALMAN_SMOOTHER_LIMITS.start + 1):
-                state[1] += (
-                    (y[k, c] - y[0, c])
-                    * 6.0
-                    * k
-                    / (
-                        KALMAN_SMOOTHER_LIMITS.start
-                        * (KALMAN_SMOOTHER_LIMITS.start + 1.0)
-                        * (2.0 * KALMAN_SMOOTHER_LIMITS.start + 1.0)
-                    )
-                )
+    state = start.copy()
     squares = np.zeros((m, m))
     innovation = np.zeros(m)
     for k in range(n):
@@ -109,6 +82,7 @@ class Smoother(NamedTuple):
         transition: (3, 3) from one sample to the next.
         gain: (3, n_channels) of the innovations.
         back: (3, 3) gain of the way back.
+        spread: (3, 3) covariance of a state that is told from the samples on one side of it alone, in units of the step.
     """
 
     step: float
@@ -117,6 +91,13 @@ class Smoother(NamedTuple):
     transition: NDArray
     gain: NDArray
     back: NDArray
+    spread: NDArray
+
+    @property
+    def one_sided(self) -> NDArray[np.float64]:
+        """Covariance (3, 3) of position, velocity and acceleration at either end of a record."""
+        units = 1.0 / self.step ** np.arange(3.0)
+        return self.spread * np.outer(units, units)
 
     def smooth(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
         """Position, velocity and acceleration (n, 3) from samples (n, n_channels)."""
@@ -124,9 +105,23 @@ class Smoother(NamedTuple):
         if len(self.observed) > y.shape[1]:  # the mean position, which nothing measures
             y = np.column_stack([y, np.zeros(len(y))])
         filtered, predicted = np.zeros((len(y), 3)), np.zeros((len(y), 3))
-        _filter(y, self.observed, self.transition, self.gain, filtered, predicted)
+        start = self._start(y)
+        _filter(y, self.observed, self.transition, self.gain, start, filtered, predicted)
         _smooth(filtered, predicted, self.back)
         return filtered / self.step ** np.arange(3.0)
+
+    def _start(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where the motion starts (3,), in units of the step: where a filter ends that goes back from the last sample (n, n_channels).
+
+        A record may start in motion, and stationary gains, which trust the start as if much was known of it, would carry along what
+        is wrong with it.
+        """
+        backwards = np.array([1.0, -1.0, 1.0])  # velocities change sign
+        reversed_y = np.ascontiguousarray((y * (self.observed @ backwards))[::-1])
+        filtered, predicted = np.zeros((len(y), 3)), np.zeros((len(y), 3))
+        guess = self.observed.T @ reversed_y[0]
+        _filter(reversed_y, self.observed, self.transition, self.gain, guess, filtered, predicted)
+        return filtered[-1] * backwards
 
 
 def smooth_motion(
@@ -215,12 +210,12 @@ def smoother_of(
         except (np.linalg.LinAlgError, ValueError):
             continue
         gain = np.ascontiguousarray(gain)
-        observed = _filter(y, h, transition, gain, np.zeros((len(y), 3)), np.zeros((len(y), 3)))
+        observed = _filter(y, h, transition, gain, h.T @ y[0], np.zeros((len(y), 3)), np.zeros((len(y), 3)))
         score = np.linalg.slogdet(innovation)[1] + np.trace(np.linalg.solve(innovation, observed))
         if np.isfinite(score) and (best is None or score < best[0]):
             posterior = covariance - gain @ h @ covariance
             back = np.ascontiguousarray(posterior @ transition.T @ np.linalg.inv(covariance))
-            best = (score, Smoother(step, powers, h, transition, gain, back))
+            best = (score, Smoother(step, powers, h, transition, gain, back, posterior))
     if best is None:
         raise IdentificationError(
             "the channels of one coordinate could not be fused; check the noise stated for them and their units"

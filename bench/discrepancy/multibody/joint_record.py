@@ -71,6 +71,7 @@ class JointRecord:
         velocity: (n,) measured, or (0,).
         noise: (n_measured,).
         start: (2,) smoothed position and velocity at the first sample.
+        start_covariance: (2, 2) of them.
         side: "motor" or "link", where the encoder sits; empty where nobody says.
         process: Equivalent white noise of the torque, one-sigma a sample.
         bodies: Body with uncertain numbers to what they change.
@@ -100,6 +101,7 @@ class JointRecord:
     velocity: Array
     noise: Array
     start: Array
+    start_covariance: Array
     side: str
     process: float
     bodies: Mapping[str, BodyTerms]

@@ -51,6 +51,16 @@ class PreparedRecord:
             joints.append(new)
         return replace(self, joints=tuple(joints))
 
+    def softened(self, level: float) -> PreparedRecord:
+        """The record with torque noise of at least `level` times the RMS torque where no servo holds a joint."""
+        joints = []
+        for joint in self.joints:
+            drive = joint.joint.drive
+            free = drive is not None and not drive.servo
+            torque = level * float(np.std(joint.command)) * abs(drive.gear * drive.kp) if free else 0.0
+            joints.append(replace(joint, process=torque, filter=None) if torque > joint.process else joint)
+        return replace(self, joints=tuple(joints))
+
 
 def prepare(
     case: Case, model: ArticulatedModel, record: CaseRecord, *, settings: DiagnosisSettings = DEFAULT
@@ -113,7 +123,7 @@ def corrected(
     now = Coefficients.of(dynamics, motion, clock, pushed)
     joints = []
     for j, old in enumerate(prepared.joints):
-        position, velocity, noise, start = _measured(motion, j)
+        position, velocity, noise, start, _ = _measured(motion, j)
         new, command = now, old.command
         wrong = encoders.get(old.joint.name, TRUE)
         if wrong.delay:  # what acts on the joint is late by as much, on the clock of its log
@@ -201,12 +211,14 @@ def beside_of(model: ArticulatedModel, j: int, speeds: Array) -> dict[str, Array
     return {name: speeds[i] for i, joint in enumerate(model.joints) if (name := joint.name) in names}
 
 
-def _measured(motion: JointMotion, j: int) -> tuple[Array, Array, Array, Array]:
-    """Measured positions, velocities, their noise, and the start of joint `j`."""
+def _measured(motion: JointMotion, j: int) -> tuple[Array, Array, Array, Array, Array]:
+    """Measured positions, velocities, their noise, the start of joint `j` and its covariance."""
     samples = motion.samples[j]
     velocity = np.ascontiguousarray(samples[:, 1]) if samples.shape[1] > 1 else np.zeros(0)
     start = np.array([motion.position[0, j], motion.velocity[0, j]])
-    return np.ascontiguousarray(samples[:, 0]), velocity, motion.noise[j], start
+    smoother = motion.smoothers[j]
+    spread = np.zeros((2, 2)) if smoother is None else smoother.one_sided[:2, :2]
+    return np.ascontiguousarray(samples[:, 0]), velocity, motion.noise[j], start, spread
 
 
 def _changes(motion: JointMotion, clock: JointClock, base: Dynamics) -> Callable[[Dynamics], Array]:
