@@ -1,0 +1,69 @@
+"""Write nine cases of robots by a fourth author, integrated apart from the bench and from MuJoCo, and the answers to them.
+
+    python scripts/fourth_robots.py CASES ANSWERS
+    python scripts/fourth_robots.py CASES ANSWERS --only finger-2 stage-1
+    python scripts/measured_cases.py finger crane wrist balanced stage ankle --cases CASES
+
+The robots are a finger of a gripper, a camera crane on velocity servos, a wrist whose currents are measured, an arm balanced by springs, a
+cart with a pendulum that nothing drives, and an ankle. CASES gets a folder for each case (`nominal.json`, `model.xml`, three records) and
+the acceptance.json by which `measured_cases.py` grades; ANSWERS gets a JSON file for each case, which is kept from the diagnosis. Equations
+of motion, friction, drives and sensors are those of the package `fourth_robots_cases`. MuJoCo only checks mass matrices and bias forces of
+the nominal models; the largest difference is printed.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from fourth_robots_cases.cases import RobotCase, robot_cases  # noqa: E402
+from fourth_robots_cases.making import MadeRobotCase, make, write  # noqa: E402
+from fourth_robots_cases.mjcf import against_mujoco  # noqa: E402
+from robot_case_sets import SetArgs, shown, write_set  # noqa: E402
+
+
+@dataclass(frozen=True)
+class Args(SetArgs):
+    """Write the cases and their answers."""
+
+    seed: int = 0
+    """Added to the seed of each case; 0 gives the cases that README.md describes."""
+
+
+def told(made: MadeRobotCase) -> str:
+    """Sizes of the effects by joint, a line for each record."""
+    lines = []
+    for record, size in made.sizes.items():
+        rows = (
+            ("main", size.main),
+            ("main/noise", size.main_over_noise),
+            ("background", size.background_friction),
+        )
+        sized = ", ".join(f"{name} {shown(row)}" for name, row in rows)
+        lines.append(f"    {record} ({size.unit}): {sized}\n")
+    return "".join(lines)
+
+
+def main() -> int:
+    """Make the cases one after another."""
+    args = tyro.cli(Args, description=__doc__)
+
+    def written(case: RobotCase) -> str:
+        made = make(case, args.seed)
+        write(made, args.cases, args.answers)
+        difference = against_mujoco(case.robot)
+        return f"{case.kind}; mass matrix and bias differ from MuJoCo's by {difference:.1e}\n{told(made)}"
+
+    rules = Path(__file__).parent / "fourth_robots_cases" / "acceptance.json"
+    write_set(robot_cases(), only=args.only, rules=rules, cases=args.cases, write=written)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
