@@ -20,6 +20,11 @@ MADE = {
         GRADED.format("third_", "third-laboratory"),
         "python scripts/third_laboratory.py out/third-laboratory",
     ),
+    "fourth_laboratory": (
+        "Cases of a fourth author, who knew nothing of the diagnosis: joints, guides, mounts, a damper, gears",
+        GRADED.format("fourth_", "fourth-laboratory"),
+        "python scripts/fourth_laboratory.py out/fourth-laboratory",
+    ),
     "second_robots": (
         "Cases of a second author, who knew nothing of the diagnosis: robots",
         GRADED.format("ptz vee scar hop dsk gan", "second-robots/cases"),
@@ -29,6 +34,11 @@ MADE = {
         "Cases of a third author, who knew nothing of the diagnosis: robots",
         GRADED.format("boom gantry hung pal slide", "third-robots/cases"),
         "python scripts/third_robots.py out/third-robots/cases out/third-robots/answers",
+    ),
+    "fourth_robots": (
+        "Cases of a fourth author, who knew nothing of the diagnosis: robots",
+        GRADED.format("finger crane wrist balanced stage ankle", "fourth-robots/cases"),
+        "python scripts/fourth_robots.py out/fourth-robots/cases out/fourth-robots/answers",
     ),
 }
 """By name: title of the capability, its command, and the command that makes its cases."""
