@@ -102,10 +102,12 @@ class Smoother(NamedTuple):
     def smooth(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
         """Position, velocity and acceleration (n, 3) from samples (n, n_channels)."""
         y = np.ascontiguousarray(samples * self.powers)
-        if len(self.observed) > y.shape[1]:  # the mean position, which nothing measures
+        measured = len(self.observed) == y.shape[1]
+        if not measured:  # the mean position, which nothing measures
             y = np.column_stack([y, np.zeros(len(y))])
         filtered, predicted = np.zeros((len(y), 3)), np.zeros((len(y), 3))
-        start = self._start(y)
+        # where positions are integrals, what a filter finds after the whole record is how far it has drifted
+        start = self._start(y) if measured else self.observed.T @ y[0]
         _filter(y, self.observed, self.transition, self.gain, start, filtered, predicted)
         _smooth(filtered, predicted, self.back)
         return filtered / self.step ** np.arange(3.0)
