@@ -12,12 +12,14 @@ References:
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from bench.arrays import Array
 from bench.discrepancy.multibody.joint_record import JointRecord
+from bench.discrepancy.multibody.records import PreparedRecord
 
 
 def whitened(original: JointRecord, record: JointRecord, out: Array, diverged: float) -> Array:
@@ -33,6 +35,17 @@ def whitened(original: JointRecord, record: JointRecord, out: Array, diverged: f
     innovation = out[:, : record.n_measured] * (original.noise / record.noise)
     found = innovation @ original.whitening.T * original.weight
     return np.nan_to_num(found, nan=diverged, posinf=diverged, neginf=-diverged)
+
+
+def softened(prepared: PreparedRecord, level: float) -> PreparedRecord:
+    """A record with torque noise of at least `level` times the RMS torque where no servo holds a joint, which lets its runs listen more."""
+    joints = []
+    for record in prepared.joints:
+        drive = record.joint.drive
+        free = drive is not None and not drive.servo
+        torque = level * float(np.std(record.command)) * abs(drive.gear * drive.kp) if free else 0.0
+        joints.append(replace(record, process=torque, filter=None) if torque > record.process else record)
+    return replace(prepared, joints=tuple(joints))
 
 
 class UnknownStart(NamedTuple):

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from bench.arrays import Array
 from bench.discrepancy.articulated_effects.effect import JointScales
 from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, placed_values
-from bench.discrepancy.articulated_search.innovations import UnknownStart, whitened
+from bench.discrepancy.articulated_search.innovations import UnknownStart, softened, whitened
 from bench.discrepancy.articulated_search.misfit import Octaves, log_likelihood, transformed
 from bench.discrepancy.case.case import Case, CaseRecord
 from bench.discrepancy.multibody.body_numbers import BodyNumbers
@@ -175,7 +175,7 @@ class ArticulatedProblem:
         """
         if all(joint.drive is not None and joint.drive.servo for joint in self.joints):
             return self
-        records = tuple(prepared.softened(level) for prepared in self.records)
+        records = tuple(softened(prepared, level) for prepared in self.records)
         return replace(self, records=records, softness=max(level, self.softness))
 
     def settled(self, hypothesis: JointHypothesis, vector: Array) -> ArticulatedProblem:

@@ -51,16 +51,6 @@ class PreparedRecord:
             joints.append(new)
         return replace(self, joints=tuple(joints))
 
-    def softened(self, level: float) -> PreparedRecord:
-        """The record with torque noise of at least `level` times the RMS torque where no servo holds a joint."""
-        joints = []
-        for joint in self.joints:
-            drive = joint.joint.drive
-            free = drive is not None and not drive.servo
-            torque = level * float(np.std(joint.command)) * abs(drive.gear * drive.kp) if free else 0.0
-            joints.append(replace(joint, process=torque, filter=None) if torque > joint.process else joint)
-        return replace(self, joints=tuple(joints))
-
 
 def prepare(
     case: Case, model: ArticulatedModel, record: CaseRecord, *, settings: DiagnosisSettings = DEFAULT
