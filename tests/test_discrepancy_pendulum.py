@@ -227,8 +227,8 @@ def test_the_map_of_a_missing_force_leaves_out_the_friction_that_the_model_has(t
     true = {"mass:carriage": 1.51, "stiffness:x": 905.0, "damping:x": 4.2}
     found = observer.estimate(case.identification[0], observer.nominal(true))
     beyond = np.maximum(np.abs(found.position) - 0.006, 0.0) * np.sign(found.position)
-    # where it sticks the friction is not known, which is a moment at every reversal
-    assert np.std(found.force - 2000.0 * beyond) < 0.1
+    # where it sticks the friction is not known, which is a moment at every reversal and the start, where it stands
+    assert np.std((found.force - 2000.0 * beyond)[1:]) < 0.1
 
 
 def test_noise_of_the_load_is_white_where_a_change_of_stiffness_shows(tmp_path):
