@@ -11,7 +11,6 @@ simulated.
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,16 +24,13 @@ from fourth_laboratory_cases.catalogue import CASES  # noqa: E402
 from fourth_laboratory_cases.grading import Graded, acceptance  # noqa: E402
 from fourth_laboratory_cases.sizing import sizes_of  # noqa: E402
 from fourth_laboratory_cases.writing import in_words, overview, write_case  # noqa: E402
-
-from bench.files import write_text  # noqa: E402
+from laboratory_case_sets import SetArgs, write_end  # noqa: E402
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(SetArgs):
     """Write the cases, acceptance.json and README.md."""
 
-    out: tyro.conf.Positional[Path]
-    """Folder for the cases."""
     seed: int = 20271105
     """Of the excitations, the nominal values, the clocks and the noise."""
 
@@ -48,9 +44,7 @@ def main() -> int:
         write_case(case, excited, args.out / case.name, args.seed)
         found.append(Graded(case, sizes_of(case, excited[-1])))
         print(f"{case.name:24s} effect / background / left {in_words(found[-1].sizes)}", flush=True)
-    write_text(args.out / "README.md", overview(found))
-    write_text(args.out / "acceptance.json", json.dumps(acceptance(found), indent=1) + "\n")
-    print(f"{len(found)} cases in {args.out}")
+    write_end(args.out, len(found), overview(found), acceptance(found))
     return 0
 
 

@@ -15,10 +15,17 @@ import numpy as np
 import tyro
 
 from bench.arrays import Array
-from bench.errors import UnknownNameError
+from bench.errors import BenchError, UnknownNameError
 from bench.files import write_text
 
 _Case = TypeVar("_Case")
+
+RECORDS = ("identification", "identification_2", "validation")
+"""Records of a case; the last one judges."""
+
+
+class UnstableRobotError(BenchError, RuntimeError):
+    """A simulated robot left the finite numbers."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,11 @@ def write_set(
     write_text(cases / "acceptance.json", rules.read_text(encoding="utf-8"))
     for name in only or known:
         print(f"{name}: {write(known[name])}", end="", flush=True)
+
+
+def in_words(kind: str, difference: float, told: str) -> str:
+    """What is printed of a case: its kind, how far its dynamics are from MuJoCo's, and what is told of its sizes."""
+    return f"{kind}; mass matrix and bias differ from MuJoCo's by {difference:.1e}\n{told}"
 
 
 def shown(row: Iterable[float | None]) -> str:

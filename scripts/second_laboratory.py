@@ -11,7 +11,6 @@ what was simulated.
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,19 +21,16 @@ import tyro
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
+from laboratory_case_sets import SetArgs, write_end  # noqa: E402
 from second_laboratory_cases.catalogue import CASES  # noqa: E402
 from second_laboratory_cases.making import Made, made  # noqa: E402
 from second_laboratory_cases.writing import acceptance, overview, write_case  # noqa: E402
 
-from bench.files import write_text  # noqa: E402
-
 
 @dataclass(frozen=True)
-class Args:
+class Args(SetArgs):
     """Write the cases, acceptance.json and README.md."""
 
-    out: tyro.conf.Positional[Path]
-    """Folder for the cases."""
     seed: int = 77120
     """Of the excitations, the nominal values and the noise."""
 
@@ -54,9 +50,7 @@ def main() -> int:
             flush=True,
         )
         found.append(one)
-    write_text(args.out / "README.md", overview(found))
-    write_text(args.out / "acceptance.json", json.dumps(acceptance(found), indent=1) + "\n")
-    print(f"{len(found)} cases in {args.out}")
+    write_end(args.out, len(found), overview(found), acceptance(found))
     return 0
 
 

@@ -11,7 +11,6 @@ catalogue holds. All have a background besides. Units, channels, excitations and
 
 from __future__ import annotations
 
-import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,18 +20,15 @@ import tyro
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
+from laboratory_case_sets import SetArgs, write_end  # noqa: E402
 from third_laboratory_cases.catalogue import CASES  # noqa: E402
 from third_laboratory_cases.writing import Made, acceptance, in_words, overview, write_case  # noqa: E402
 
-from bench.files import write_text  # noqa: E402
-
 
 @dataclass(frozen=True)
-class Args:
+class Args(SetArgs):
     """Write the cases, acceptance.json and README.md."""
 
-    out: tyro.conf.Positional[Path]
-    """Folder for the cases."""
     seed: int = 990317
     """Of the excitations, the nominal values, the noise and the faults."""
 
@@ -47,9 +43,7 @@ def main() -> int:
         write_case(one, args.out / case.name, rng)
         print(f"{case.name:34s} effect / background / left {in_words(one.simulated.sizes)}", flush=True)
         found.append(one)
-    write_text(args.out / "README.md", overview(found))
-    write_text(args.out / "acceptance.json", json.dumps(acceptance(found), indent=1) + "\n")
-    print(f"{len(found)} cases in {args.out}")
+    write_end(args.out, len(found), overview(found), acceptance(found))
     return 0
 
 

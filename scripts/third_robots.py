@@ -22,7 +22,7 @@ import tyro
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from robot_case_sets import SetArgs, shown, write_set  # noqa: E402
+from robot_case_sets import SetArgs, in_words, shown, write_set  # noqa: E402
 from third_robots_cases.cases import RobotCase, robot_cases  # noqa: E402
 from third_robots_cases.making import MadeRobotCase, make, write  # noqa: E402
 from third_robots_cases.mjcf import against_mujoco  # noqa: E402
@@ -52,8 +52,7 @@ def main() -> int:
     def written(case: RobotCase) -> str:
         made = make(case, args.seed)
         write(made, args.cases, args.answers)
-        difference = against_mujoco(case.robot, case.drive)
-        return f"{case.kind}; mass matrix and bias differ from MuJoCo's by {difference:.1e}\n{told(made)}"
+        return in_words(case.kind, against_mujoco(case.robot, case.drive), told(made))
 
     rules = Path(__file__).parent / "third_robots_cases" / "acceptance.json"
     write_set(robot_cases(), only=args.only, rules=rules, cases=args.cases, write=written)

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from robot_case_sets import RECORDS, UnstableRobotError
 
 from bench.arrays import Array
-from bench.errors import BenchError
 from bench.files import write_text
 from fourth_robots_cases.answers import Measured, Sizes, answer_document, root_mean_square, sizes
 from fourth_robots_cases.cases import RobotCase
@@ -21,13 +21,6 @@ from fourth_robots_cases.recording import logged, write_record
 from fourth_robots_cases.running import Clock, clock_of, command_of, replayed, run
 from fourth_robots_cases.stating import nominal_document
 from fourth_robots_cases.stepping import Trace
-
-RECORDS = ("identification", "identification_2", "validation")
-"""Records of a case; the last one judges."""
-
-
-class UnstableRobotError(BenchError, RuntimeError):
-    """A simulated robot left the finite numbers."""
 
 
 class MadeRobotCase(NamedTuple):

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from robot_case_sets import RECORDS, UnstableRobotError
 
 from bench.arrays import Array
-from bench.errors import BenchError
 from bench.files import write_text
 from second_robots_cases.answers import Sizes, answer_document, sizes
 from second_robots_cases.cases import RobotCase
@@ -21,14 +21,8 @@ from second_robots_cases.references import Plan, reference
 from second_robots_cases.running import Run, run
 from second_robots_cases.stating import nominal_document
 
-RECORDS = ("identification", "identification_2", "validation")
-"""Records of a case; the last one judges."""
 SHORTEST, LONGEST = 10, 16
 """Duration of a record [s], which is drawn from whole numbers."""
-
-
-class UnstableRobotError(BenchError, RuntimeError):
-    """A simulated robot left the finite numbers."""
 
 
 class Plants(NamedTuple):

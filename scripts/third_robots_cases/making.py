@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from robot_case_sets import RECORDS, UnstableRobotError
 
 from bench.arrays import Array
-from bench.errors import BenchError
 from bench.files import write_text
 from third_robots_cases.answers import Runs, Sizes, answer_document, root_mean_square, sizes
 from third_robots_cases.cases import RobotCase
@@ -19,13 +19,6 @@ from third_robots_cases.plant import Plant, drawn_plant, nominal_plant
 from third_robots_cases.recording import VELOCITY_NOISE, Noise, logged, write_record
 from third_robots_cases.running import Run, run
 from third_robots_cases.stating import nominal_document
-
-RECORDS = ("identification", "identification_2", "validation")
-"""Records of a case; the last one judges."""
-
-
-class UnstableRobotError(BenchError, RuntimeError):
-    """A simulated robot left the finite numbers."""
 
 
 class MadeRobotCase(NamedTuple):

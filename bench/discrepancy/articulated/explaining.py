@@ -257,8 +257,9 @@ def _left(judge: Judge, final: ArticulatedFit, predicted: PredictedErrors, *, st
     lost = astray(judge.judging, believed, predicted, judged) if runs else None
     # power above the noise at some frequencies shows that what is named is not all; where nothing is named it is no evidence that
     # something is missing, which takes an effect that predicts the judging records better
-    noise_alone = lost is None and (left is None or not final.hypothesis) and complete(problem, final, judged)
-    return _Left(left, lost, noise_alone and runs, noise_alone and stated and runs)
+    quiet = lost is None and (left is None or not final.hypothesis) and complete(problem, final, judged)
+    noise_alone = runs and quiet
+    return _Left(left, lost, noise_alone, noise_alone and stated)
 
 
 def _asks_torque(found: Explained) -> bool:
