@@ -376,6 +376,10 @@ ARM_EFFECTS = {
         None, pushed(lambda t, q, v: -1.2 * math.sin(7.0 * q + math.atan2(0.5, 1.0)) , "elbow"),
         effect("cogging", "elbow", "elbow", sine=1.2 / math.hypot(1.0, 0.5), cosine=0.6 / math.hypot(1.0, 0.5), periods_per_turn=7.0),
     ),
+    "cogging by its pitch": (
+        None, pushed(lambda t, q, v: -1.2 * math.sin(7.0 * q + math.atan2(0.5, 1.0)) , "elbow"),
+        effect("cogging", "elbow", "elbow", sine=1.2 / math.hypot(1.0, 0.5), cosine=0.6 / math.hypot(1.0, 0.5), pitch=2.0 * math.pi / 7.0),
+    ),
 }  # fmt: skip
 
 

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -193,3 +194,68 @@ def test_a_short_log_of_a_servo_is_diagnosed(tmp_path):
     left_out = {e.name for e in CATALOGUE} - {"coulomb_friction", "damping_error"}
     verdict = diagnose(read_case(folder), exclude=left_out).verdict
     assert {(e.name, e.where) for e in verdict.named} == {("coulomb_friction", "elbow")}
+
+
+@pytest.mark.slow
+def test_cogging_along_a_slide_has_a_pitch_in_metres(tmp_path):
+    """A carriage on a linear motor with poles 30 mm apart, a mast that swings on it: periods in a turn say nothing of a slide."""
+    text = """<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody><body name="carriage">
+      <joint name="rail" type="slide" axis="1 0 0" damping="12"/><geom type="box" size="0.1 0.1 0.05" mass="4"/>
+      <body name="mast" pos="0 0 -0.1"><joint name="pivot" type="hinge" axis="0 1 0" damping="0.05" armature="0.01"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02" mass="0.6"/></body></body></worldbody>
+      <actuator><motor name="linear" joint="rail"/><position name="swing" joint="pivot" kp="20" kv="1"/></actuator></mujoco>"""
+    (tmp_path / "cart.xml").write_text(text, encoding="utf-8")
+    for seed, name in enumerate(("identification", "validation")):
+        model = mujoco.MjModel.from_xml_string(text)
+        data, rng, rows = mujoco.MjData(model), np.random.default_rng(seed), []
+        phases = 6.0 * rng.random(6)
+        for k in range(2500):
+            t = 0.005 * k
+            ramp = min(t, 1.0)
+            wanted = (
+                ramp
+                * 0.08
+                * sum(np.sin(2 * np.pi * f * t + p) for f, p in zip((0.3, 0.7, 1.1), phases, strict=False))
+            )
+            goal = ramp * 0.3 * np.sin(2 * np.pi * 0.5 * t + phases[3])
+            force = 2000.0 * (wanted - data.qpos[0]) - 120.0 * data.qvel[0]
+            data.ctrl[:] = force, goal
+            noisy = data.qpos + (1e-6, 1e-5) * rng.standard_normal(2)
+            rows.append([t, force + 0.02 * rng.standard_normal(), goal, *noisy])
+            for _ in range(5):
+                data.qfrc_applied[0] = -6.0 * np.sin(2.0 * np.pi * data.qpos[0] / 0.03 + 0.5)
+                mujoco.mj_step(model, data)
+        np.savetxt(
+            tmp_path / f"{name}.csv",
+            rows,
+            delimiter=",",
+            header="time,force,goal,x,angle",
+            comments="",
+            fmt="%.9g",
+        )
+    parameters = {
+        "mass:carriage": {"value": 4.0, "std": 0.1, "unit": "kg"},
+        "damping:rail": {"value": 12.0, "std": 2.0, "unit": "N s/m"},
+        "damping:pivot": {"value": 0.05, "std": 0.01, "unit": "N m s/rad"},
+    }
+    channels = {
+        "force": {"unit": "N", "role": "measured", "actuator": "linear", "noise_std": 0.02},
+        "goal": {"unit": "rad", "role": "command", "actuator": "swing", "noise_std": 0},
+        "x": {"unit": "m", "joint": "rail", "quantity": "position", "noise_std": 1e-6},
+        "angle": {"unit": "rad", "joint": "pivot", "quantity": "position", "noise_std": 1e-5},
+    }
+    told = {
+        "rig": "cart.xml",
+        "load_interpolation": "zero_order_hold",
+        "parameters": parameters,
+        "channels": channels,
+    }
+    (tmp_path / "nominal.json").write_text(json.dumps(told), encoding="utf-8")
+    verdict = diagnose(read_case(tmp_path)).verdict
+    (found,) = (e for e in verdict.named if e.name == "cogging")
+    assert found.where == "rail"
+    assert found.parameters["pitch"].value == pytest.approx(0.03, rel=0.01)
+    assert found.parameters["pitch"].unit == "m"
+    assert np.hypot(found.parameters["sine"].value, found.parameters["cosine"].value) == pytest.approx(
+        6.0, rel=0.1
+    )

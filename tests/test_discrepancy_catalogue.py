@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 
@@ -29,11 +30,12 @@ from planted_cases import (
 )
 from scipy.signal import lsim
 
-from bench.discrepancy import diagnose
+from bench.discrepancy import diagnose, read_case
 from bench.discrepancy.case.channel_noise import quantisation_step, raised_noise
 from bench.discrepancy.effects.catalogue import CATALOGUE, effect_named
 from bench.discrepancy.effects.channel_operators import high_pass, low_pass, second_order_low_pass
 from bench.discrepancy.effects.effect import unit_of
+from bench.discrepancy.fitting.goodness_of_fit import names
 from bench.discrepancy.model.placements import placements
 from bench.discrepancy.model.rigs import structure_of
 from bench.discrepancy.motion.observer import Observer
@@ -314,3 +316,41 @@ def test_a_lattice_is_seen_through_the_rounding_of_a_text_file_and_not_elsewhere
     assert quantisation_step(np.sign(x)) == 0.0
     assert raised_noise(1e-3, printed) == pytest.approx(math.hypot(1e-3, 0.0123 / math.sqrt(12.0)))
     assert raised_noise(0.1, printed) == 0.1
+
+
+def test_a_wrong_inertia_is_asked_for_once_at_the_innermost_joint_that_moves_it(tmp_path):
+    """A disc on a shaft turns with both joints: its inertia is one number, and one candidate."""
+    (tmp_path / "discs.xml").write_text(
+        """<mujoco><option gravity="0 0 0"/><worldbody><body name="flywheel">
+        <joint name="bearing" type="hinge" axis="0 0 1" stiffness="300" damping="0.6"/>
+        <inertial pos="0 0 0" mass="6" diaginertia="0.03 0.03 0.05"/>
+        <body name="disc"><joint name="coupling" type="hinge" axis="0 0 1" stiffness="240" damping="0.4"/>
+        <inertial pos="0 0 0" mass="3" diaginertia="0.02 0.02 0.03"/></body></body></worldbody>
+        <actuator><motor name="motor" joint="bearing"/></actuator></mujoco>""",
+        encoding="utf-8",
+    )
+    told = {
+        "rig": "discs.xml",
+        "sample_rate_hz": 500,
+        "parameters": {
+            "inertia:flywheel": {"value": 0.05, "std": 0.001, "unit": "kg m^2"},
+            "inertia:disc": {"value": 0.03, "std": 0.001, "unit": "kg m^2"},
+        },
+        "channels": {
+            "torque": {"unit": "N m", "role": "measured", "actuator": "motor", "noise_std": 0.01},
+            "speed": {"unit": "rad/s", "joint": "bearing", "quantity": "velocity", "noise_std": 0.01},
+        },
+    }
+    (tmp_path / "nominal.json").write_text(json.dumps(told), encoding="utf-8")
+    for name in ("identification", "validation"):
+        np.savetxt(
+            tmp_path / f"{name}.csv", np.zeros((500, 2)), delimiter=",", header="torque,speed", comments=""
+        )
+    case = read_case(tmp_path)
+    structure = structure_of(case)
+    found = placements(case, structure, [effect_named("mass_error")])
+    assert [(p.place.name, p.target) for p in found] == [
+        ("bearing", "inertia:flywheel"),
+        ("coupling", "inertia:disc"),
+    ]
+    assert names(tuple(found[1:])) == "mass_error (coupling: inertia:disc)"

@@ -25,7 +25,14 @@ from bench.discrepancy.fitting.goodness_of_fit import complexity, leaves_much
 from bench.discrepancy.fitting.map_fit import fit
 from bench.discrepancy.judgement.coarse import Judged, judge
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
-from bench.discrepancy.judgement.finalists import bounded, finalists, no_larger, without
+from bench.discrepancy.judgement.finalists import (
+    believed,
+    bounded,
+    finalists,
+    no_larger,
+    nominal_moves,
+    without,
+)
 from bench.discrepancy.likelihood.model_error import (
     ModelInadequacy,
     band_weights,
@@ -163,7 +170,11 @@ def test_records_in_windows_count_as_many_samples_as_whole_ones():
 
 
 def placed(problem, *names):
-    return tuple(Placed(effect_named(name), problem.structure.places[0]) for name in names)
+    effects = [effect_named(name) for name in names]
+    targets = ["mass" if e.site == "inertia" else "" for e in effects]
+    return tuple(
+        Placed(e, problem.structure.places[0], target) for e, target in zip(effects, targets, strict=True)
+    )
 
 
 def explanation(problem, *names, near=None):
@@ -326,6 +337,32 @@ def test_nominal_parameters_stay_within_what_is_believed_whatever_is_taken_from_
     assert kept.parts[0][0].within == 4.0
     alone = without(kept, 0)
     assert np.abs(alone.parts[0][1].vector[: problem.n_physical]).max() <= 4.0
+
+
+def test_what_an_effect_closes_is_held_against_a_nominal_model_that_is_believed(monkeypatch):
+    """A parameter that is moved to where its move is a finding has closed most of that finding itself."""
+    case = planted_case(lambda f: linear_motion(f, mass=1.06 * MASS, stiffness=STIFFNESS), n=1500)
+    problem = problem_of(case, crude_error(case, structure_of(case)))
+    nothing, mass = explanation(problem), explanation(problem, "mass_error")
+    settings = problem.settings.judgement.coarse
+    assert np.abs(nominal_moves(nothing)).max() > settings.finding
+    alone = believed(nothing, mass, settings)
+    assert np.abs(nominal_moves(alone)).max() <= settings.finding + 1e-9
+    assert believed(alone, mass, settings) is alone
+    # an explanation that moves them as far itself gains nothing by that
+    assert believed(nothing, nothing, settings) is nothing
+
+    def pays(after, within):
+        left = {nothing: 0.016, alone: 0.05, mass: after}
+        monkeypatch.setattr(Discrepancies, "of", lambda self, e, *, judging: np.array([left[e]]))
+        monkeypatch.setattr(Discrepancies, "as_stated", np.array([0.3]))
+        known = Discrepancies(case, problem)
+        known._floor = np.array([0.005])
+        return known.pays(mass, nothing, 0.5, within)
+
+    assert pays(0.0095, alone)
+    assert not pays(0.0095, None)
+    assert not pays(0.02, alone)  # what parameters alone leave may not grow, wherever they go
 
 
 def test_nominal_parameters_that_are_moved_far_are_told():

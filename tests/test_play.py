@@ -137,3 +137,70 @@ def test_a_play_before_a_link_that_bounces_in_it_is_named_with_its_width(folder)
     assert width.std >= 0.01 * width.value
     assert verdict.gap.after < 0.3 * verdict.gap.before
     assert any("corrected by the encoder" in line for line in verdict.warnings)
+
+
+LEG = """<mujoco><option timestep="0.0002"><flag contact="disable"/></option><compiler angle="radian"/><worldbody>{}</worldbody>
+  <actuator><position name="servo" joint="knee" kp="13" kv="0.2"/></actuator></mujoco>"""
+SHIN = '<inertial pos="0 0 -0.06" mass="0.09" diaginertia="2e-4 2e-4 1e-5"/>'
+KNEE = '<joint name="knee" type="hinge" axis="0 1 0" armature="0.006" damping="0.05"/>'
+LOOSE = 0.02
+
+
+def walked(folder: Path, name: str, seconds: float, seed: int) -> None:
+    """A log of goals and of the angle of a light shin behind the play of its servo's gear, at 100 Hz."""
+    play = f'<joint name="play" type="hinge" axis="0 1 0" range="-{LOOSE} {LOOSE}" limited="true" solreflimit="0.003 1"/>'
+    rotor = '<inertial pos="0 0 0" mass="1e-3" diaginertia="1e-8 1e-8 1e-8"/>'
+    model = mujoco.MjModel.from_xml_string(LEG.format(f"<body>{rotor}{KNEE}<body>{SHIN}{play}</body></body>"))
+    data, rng, time = (
+        mujoco.MjData(model),
+        np.random.default_rng(seed),
+        np.arange(round(100.0 * seconds)) / 100.0,
+    )
+    goal = sum(
+        0.2 * np.sin(2 * np.pi * f * time + p)
+        for f, p in zip((0.4, 0.9, 1.7, 2.6), 6.0 * rng.random(4), strict=True)
+    )
+    goal *= np.minimum(time / 0.5, 1.0)
+    angle = np.empty(len(time))
+    for k, asked in enumerate(goal):
+        angle[k], data.ctrl[0] = data.qpos.sum(), asked
+        mujoco.mj_step(model, data, 50)
+    rows = np.column_stack([time, goal, angle + 4e-4 * rng.standard_normal(len(time))])
+    np.savetxt(folder / f"{name}.csv", rows, delimiter=",", header="time,goal,angle", comments="", fmt="%.9g")
+
+
+@pytest.mark.slow
+def test_a_play_is_found_where_long_steps_bounce_off_its_teeth_and_one_start_leads_nowhere(tmp_path):
+    """Steps of 2.5 ms follow the servo, not the teeth; and of the clearances that promise most, few lead to the true one."""
+    (tmp_path / "leg.xml").write_text(LEG.format(f'<body name="shin">{SHIN}{KNEE}</body>'), encoding="utf-8")
+    parameters = {
+        "mass:shin": {"value": 0.09, "std": 0.003, "unit": "kg"},
+        "damping:knee": {"value": 0.05, "std": 0.015, "unit": "N m s/rad"},
+        "armature:knee": {"value": 0.006, "std": 0.0006, "unit": "kg m^2"},
+        "kp:servo": {"value": 13.0, "std": 1.0, "unit": "N m/rad"},
+    }
+    channels = {
+        "goal": {"unit": "rad", "role": "command", "actuator": "servo", "noise_std": 0},
+        "angle": {
+            "unit": "rad",
+            "noise_std": 4e-4,
+            "side": "link",
+            "joint": "knee",
+            "quantity": "position",
+        },
+    }
+    told = {
+        "rig": "leg.xml",
+        "load_interpolation": "zero_order_hold",
+        "parameters": parameters,
+        "channels": channels,
+    }
+    (tmp_path / "nominal.json").write_text(json.dumps(told), encoding="utf-8")
+    for seed, (name, seconds) in enumerate(
+        {"identification": 12, "identification_2": 12, "validation": 10}.items()
+    ):
+        walked(tmp_path, name, seconds, 1 + seed)
+    verdict = diagnose(read_case(tmp_path)).verdict
+    assert [(effect.name, effect.where) for effect in verdict.named] == [("backlash", "knee")]
+    assert verdict.named[0].parameters["half_clearance"].value == pytest.approx(LOOSE, rel=0.05)
+    assert verdict.gap.after < 0.4 * verdict.gap.parameters_only

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from test_articulated import LIMIT, mjcf, write_case
 
 from bench.cli import main
+from bench.discrepancy import read_case
 from bench.discrepancy.case.case import Case, CaseChannel, CaseRecord
+from bench.discrepancy.precheck.joints import admitted_joints, joint_doubts
 from bench.discrepancy.precheck.positions import position_doubts
 from bench.discrepancy.precheck.samples import sample_doubts
 from bench.discrepancy.precheck.settings import CheckSettings
@@ -87,6 +91,32 @@ def test_a_joint_that_its_friction_holds_is_no_stuck_sensor_and_at_no_end_of_its
     stuck = Held.target + 1e-5 * np.random.default_rng(0).standard_normal(len(Held.time))
     stuck[1000:1030] = stuck[1000]
     assert any("stands still" in doubt for doubt in Held.doubts(Held.record(angle=stuck)))
+    # a goal rests where it is told to
+    assert not any("stands still" in doubt for doubt in Held.doubts(Held.record(goal=stuck)))
+
+
+def test_a_joint_that_some_record_holds_is_told_by_the_others(tmp_path):
+    """A test of one joint at a time holds the others; what no record moves is said once."""
+    folder = write_case(tmp_path, mjcf(servo=True, friction=LIMIT), servo=True)
+    case = read_case(folder)
+
+    def said(*held):
+        records = []
+        for k, record in enumerate((case.identification[0], case.identification[0])):
+            still = {
+                name: np.full_like(x, x[0])
+                for name, x in record.values.items()
+                if k in held and name.startswith("elbow")
+            }
+            records.append(replace(record, name=f"run {k}", values=record.values | still))
+        own, model, _ = admitted_joints(replace(case, identification=tuple(records)))
+        return [doubt for doubt in joint_doubts(own, model) if "elbow" in doubt]
+
+    assert not said()
+    assert not said(0)
+    assert said(0, 1) == [
+        "joint 'elbow' hardly moves in any record: its friction, inertia and drive cannot be told from that"
+    ]
 
 
 def _write(folder, records, nominal):

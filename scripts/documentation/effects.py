@@ -191,8 +191,8 @@ def _equation(effect: Effect | ArticulatedEffect) -> list[str]:
 def page(name: str) -> str:
     """The page of the effect of that name, of linear structures and of arms together."""
     linear = next((e for e in LINEAR if e.name == name), None)
-    arm = next((e for e in ARTICULATED if e.name == name), None)
-    first = linear or arm
+    arms = [e for e in ARTICULATED if e.name == name]
+    first = linear or next(iter(arms), None)
     assert first is not None
     lines = [f"# {name}", "", *_equation(first), "## In a record", "", look_of(name), ""]
     if linear is not None and linear.law is not None:
@@ -219,8 +219,14 @@ def page(name: str) -> str:
             "",
         ]
         lines += [*_table(linear.parameters), ""]
-    if arm is not None:
-        lines += ["## On an arm, a leg or a servo", "", f"Place: {arm.site}. Family: {arm.family}.", ""]
+    for arm in arms:
+        where = "" if arm.hinge is None else ": a hinge" if arm.hinge else ": a slide"
+        lines += [
+            f"## On an arm, a leg or a servo{where}",
+            "",
+            f"Place: {arm.site}. Family: {arm.family}.",
+            "",
+        ]
         lines += [
             *(_equation(arm) if linear is not None and arm.equation != linear.equation else []),
             *_table(arm.parameters),

@@ -245,7 +245,8 @@ def element(target: Target, effect: NamedEffect) -> Change:
         law, theta = "lugre", (v["limit"], v["stiffness"], v["damping"], 0.0, 1.0, 0.0)
     elif not law and effect.name == "cogging":
         amplitude, phase = math.hypot(v["sine"], v["cosine"]), math.atan2(v["cosine"], v["sine"])
-        law, theta = "cogging", (amplitude, 2.0 * math.pi / v["periods_per_turn"], phase)
+        pitch = v["pitch"] if "pitch" in v else 2.0 * math.pi / v["periods_per_turn"]
+        law, theta = "cogging", (amplitude, pitch, phase)
     if not law:
         return Change(
             effect.name, name, "none", "neither MuJoCo nor the bench has a form of it; correct it where it is"

@@ -19,7 +19,7 @@ from bench.discrepancy.articulated.held_inputs import HELD, explained_as_held
 from bench.discrepancy.articulated.naming import closest_rival
 from bench.discrepancy.articulated.next_test import JointProposal, Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
-from bench.discrepancy.articulated.stepping import accurate, stepped
+from bench.discrepancy.articulated.stepping import accurate, misses_a_drive, stepped
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
 from bench.discrepancy.articulated_judgement.predicted_errors import predict
 from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
@@ -114,12 +114,18 @@ def diagnose_articulated(
         return explained(problem, placements(problem, catalogue), question)
 
     def asked(case: Case) -> Explained:
-        """In steps that are short enough, for the nominal model and for what is named."""
+        """In steps that are short enough, for the nominal model, for what is named and for a drive that longer ones cannot follow."""
         problem = stepped(case, model, settings, deadline)
         found = explain(problem)
-        if _accurate(problem, found, settings):
+        if problem.settings is settings:
             return found
-        return explain(ArticulatedProblem.of(case, model, case.identification, settings, deadline))
+        finer = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
+        if _accurate(problem, found, settings) and (
+            found.verdict.complete
+            or not misses_a_drive(finer, found.final, placements(finer, catalogue), progress)
+        ):
+            return found
+        return explain(finer)
 
     found = asked(case)
     steps_kept = all(a.step == b.step for a, b in zip(told.identification, case.identification, strict=True))

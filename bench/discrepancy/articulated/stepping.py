@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from bench.discrepancy.articulated_search.fitting import ArticulatedFit
+from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
+from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.articulated_search.rounds import best_of, grounds_of, quiet
 from bench.discrepancy.articulated_search.search import nominal_fit
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.multibody.model import ArticulatedModel
@@ -23,7 +26,7 @@ def stepped(
     Longer ones than usual are asked of servos alone: their runs go from end to end of a log, those of torques are short.
     """
     own = settings.articulated
-    servos = all(joint.drive is not None and joint.drive.servo for joint in model.joints)
+    servos = all(joint.held for joint in model.joints)
     sample = min(record.step for record in case.identification)
     longest = min(sample / own.steps_a_sample, own.longest_of_few) if servos else 0.0
     if longest >= 2.0 * own.longest_step:  # else what is saved pays for the comparison at best
@@ -62,3 +65,46 @@ def accurate(
     apart = np.abs(misfit[0] - misfit[1]) * samples / len(shortest)
     least = 0.5 * settings.articulated.judgement.small * nominal.beyond_noise
     return bool(np.all(apart < np.maximum(2.0 * settings.articulated.search.worth, least)))
+
+
+def misses_a_drive(
+    finer: ArticulatedProblem,
+    found: ArticulatedFit,
+    candidates: Sequence[PlacedOnJoint],
+    progress: Callable[[str], None] = lambda text: None,
+) -> bool:
+    """Whether an elastic drive explains a joint better, in steps as fine as usual, than what was found for it in longer ones.
+
+    The teeth of a gear are stiff: where the link is light they meet and part within a few milliseconds, and a run in longer steps is
+    thrown off by them, however well such steps follow the nominal model.
+
+    Args:
+        finer: The problem in fine steps.
+        found: What was found.
+        candidates: Effects at places; those that are elastic drives are asked.
+        progress: Called with a line of text at every joint.
+    """
+    search, judged = finer.settings.articulated.search, finer.settings.articulated.judgement
+
+    def again(fitted: ArticulatedFit, keep: Callable[[PlacedOnJoint], bool]) -> ArticulatedFit:
+        etas = finer.etas(fitted.hypothesis, fitted.vector)
+        kept = [(p, eta) for p, eta in zip(fitted.hypothesis, etas, strict=True) if keep(p)]
+        hypothesis = tuple(p for p, _ in kept)
+        vector = np.concatenate([fitted.vector[: len(finer.nominal)], *(eta for _, eta in kept)])
+        scale = ArticulatedFit.at(finer, hypothesis, vector).scale
+        return refitted(finer, hypothesis, vector, scale=scale)
+
+    whole = again(found, lambda placed: True)
+    for j in np.flatnonzero(~quiet(whole, judged)):
+        trains = [c for c in candidates if c.effect.train and c.joint == j]
+        if not (trains and finer.deadline.allows("elastic drives in finer integration steps")):
+            continue
+        progress(f"joint '{finer.joints[j].name}' in finer steps")
+        rest = again(whole, lambda placed, j=j: placed.joint != j)
+        least = whole.log_posterior - search.sight
+        told = best_of(
+            finer, rest, grounds_of(finer, rest, search), trains, search, lambda text: None, least=least
+        )
+        if told.best is not None and told.best.log_posterior > whole.log_posterior + search.worth:
+            return True
+    return False

@@ -20,6 +20,8 @@ from bench.discrepancy.multibody.joint_forces import Slot
 
 TEETH = tuple(float(n) for n in range(2, 121))
 """Periods of cogging in a turn that are tried: slots, poles and teeth are whole numbers."""
+PITCHES = log_grid(*(2.0 / n for n in np.arange(1.5, 60.5, 0.5)))
+"""Pitches of cogging along a slide that are tried, over its largest excursion: half a period more in the travel each."""
 PLAYS = log_grid(*np.geomspace(0.003, 0.3, 34))
 """Half clearances that are tried, a factor of 1.15 apart: the misfit of a link that bounces falls to the true one only from near by."""
 MOTOR_SHARE = FreeParameter(
@@ -29,6 +31,12 @@ MOTOR_SHARE = FreeParameter(
 ON_LINK = FreeParameter("encoder_on_link", fixed=True, signed=True, grid=(0.0, 1.0), unit="1")
 """Side of the encoder; tried where the channel does not state its ``"side"``."""
 RELATIVE = FreeParameter("relative_error", signed=True, mean=0.0, std=0.3, bounds=(-0.95, 20.0), unit="1")
+
+
+_SINE_AND_COSINE = tuple(
+    FreeParameter(name, "force", signed=True, mean=0.0, std=0.3, bounds=(-10.0, 10.0))
+    for name in ("sine", "cosine")
+)
 
 
 def _time(name: str, middle: float, highest: float) -> FreeParameter:
@@ -112,14 +120,33 @@ DRIVE_EFFECTS: tuple[ArticulatedEffect, ...] = (
         "drive",
         "joint",
         (
-            FreeParameter("sine", "force", signed=True, mean=0.0, std=0.3, bounds=(-10.0, 10.0)),
-            FreeParameter("cosine", "force", signed=True, mean=0.0, std=0.3, bounds=(-10.0, 10.0)),
+            *_SINE_AND_COSINE,
             FreeParameter(
                 "periods_per_turn", fixed=True, signed=True, grid=TEETH, unit="1", bounds=(1.0, 400.0)
             ),
         ),
         "f = A sin(n q + phase)",
         cogging,
+        hinge=True,
+    ),
+    ArticulatedEffect(
+        "cogging",
+        "drive",
+        "joint",
+        (
+            *_SINE_AND_COSINE,
+            FreeParameter(
+                "pitch",
+                "position",
+                mean=math.log(0.2),
+                std=1.5,
+                bounds=(math.log(0.01), math.log(2.0)),
+                grid=PITCHES,
+            ),
+        ),
+        "f = A sin(2 pi q / pitch + phase)",
+        cogging,
+        hinge=False,
     ),
     ArticulatedEffect(
         "actuator_delay",

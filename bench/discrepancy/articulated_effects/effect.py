@@ -84,6 +84,7 @@ class ArticulatedEffect:
         slots: For joints and actuators: values and the parameter vector (SLOTS,) to be changed in place.
         encoder: For sensors: values to what is wrong.
         servo: Only for servos (True), only for forces (False), or both (None).
+        hinge: Only at hinges (True), only at slides (False), or both (None).
         needs: Quantity that has to be measured ("velocity"), if any.
         coordinate: Name of the parameter that is a coordinate of its place, free about `JointScales.middle`, if any.
         contains: Names of simpler effects that it is for some values of its parameters, and how their values are then its own.
@@ -97,6 +98,7 @@ class ArticulatedEffect:
     slots: Callable[[SlotValues, Array], None] | None = None
     encoder: Callable[[SlotValues], Encoder] | None = None
     servo: bool | None = None
+    hinge: bool | None = None
     needs: str = ""
     coordinate: str = ""
     contains: Mapping[str, Callable[[SlotValues], SlotValues]] = field(default_factory=dict)

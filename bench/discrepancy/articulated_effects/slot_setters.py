@@ -82,9 +82,14 @@ def stop(values: SlotValues, p: Array) -> None:
     p[Slot.STOP_SIDE] = values["side"]
 
 
+def periods(values: SlotValues) -> float:
+    """Angular frequency along the coordinate of something periodic: periods in a turn, or 2 pi over the pitch along a slide."""
+    return 2.0 * math.pi / values["pitch"] if "pitch" in values else values["periods_per_turn"]
+
+
 def cogging(values: SlotValues, p: Array) -> None:
-    """Put a torque that is periodic in the angle."""
+    """Put a torque that is periodic in the angle, or a force along a slide."""
     sine, cosine = values["sine"], values["cosine"]
     p[Slot.COGGING] = math.hypot(sine, cosine)
-    p[Slot.PERIODS] = values["periods_per_turn"]
+    p[Slot.PERIODS] = periods(values)
     p[Slot.PHASE] = math.atan2(cosine, sine)

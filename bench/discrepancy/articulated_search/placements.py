@@ -37,6 +37,8 @@ def _at(
     assert drive is not None
     if effect.servo is not None and effect.servo != drive.servo:
         return []
+    if effect.hinge is not None and effect.hinge != (joint.unit == "rad"):
+        return []
     if effect.needs == "velocity" and problem.records[0].joints[j].n_measured < 2:
         return []
     if effect.site == "pair":

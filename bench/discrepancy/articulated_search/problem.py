@@ -173,7 +173,7 @@ class ArticulatedProblem:
         A free run that nothing corrects remembers every error of a wrong model to its end: the misfit of an elastic or slipping drive
         has then a minimum at the truth and many beside it. Corrected a little at every sample, it forgets.
         """
-        if all(joint.drive is not None and joint.drive.servo for joint in self.joints):
+        if all(joint.held for joint in self.joints):
             return self
         records = tuple(softened(prepared, level) for prepared in self.records)
         return replace(self, records=records, softness=max(level, self.softness))

@@ -102,7 +102,7 @@ def best_of(
             points += screen(soft, _untouched(soft, ground), candidates)
         # where runs forget, other log posteriors hold
         short_of = least if soft is problem else -np.inf
-        told = by_effect(points, settings.starts)
+        told = by_effect(points, settings.starts, settings.plays if soft is problem else 0)
         first = _fits(soft, ground, told, settings, progress, gained, short_of)
     first = [f for f in first if sound(problem, f)] or first
     finalists = sorted(first, key=lambda f: -f.log_posterior)[: settings.finalists]
@@ -318,12 +318,15 @@ def _fits(
             for begins in _begins(point.start, base.vector, untouched, apart=bool(moved))
         ]
         steps = settings.iterations if len(starts) == 1 else settings.tried
-        tried = in_threads(
-            lambda start, hypothesis=hypothesis, steps=steps: fit(
-                problem, hypothesis, start, scale=base.scale, iterations=steps, others=others
-            ),
-            starts,
-        )
+
+        def begun(start: Array, hypothesis=hypothesis, steps=steps) -> ArticulatedFit:
+            return fit(problem, hypothesis, start, scale=base.scale, iterations=steps, others=others)
+
+        def ended(start: Array, hypothesis=hypothesis, least=least) -> ArticulatedFit:
+            return refitted(problem, hypothesis, start, scale=base.scale, others=others, least=least)
+
+        # of a play whose runs never forget, the first steps from a clearance tell nothing of where it leads
+        tried = in_threads(ended if len(mine) > settings.starts else begun, starts)
         first = max(tried, key=lambda f: f.log_posterior)
         new = refitted(problem, hypothesis, first.vector, scale=first.scale, others=others, least=least)
         # fitted once is held against fitted once: refits gain most where what is missing is large

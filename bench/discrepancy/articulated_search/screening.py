@@ -177,9 +177,12 @@ def _sides(problem: ArticulatedProblem, placed: PlacedOnJoint) -> tuple[float, .
     return {"motor": (0.0,), "link": (1.0,)}.get(side, (0.0, 1.0))
 
 
-def by_effect(points: Sequence[Screened], starts: int) -> list[list[Screened]]:
-    """Grid points effect by effect, the most promising effects first, and of each the `starts` most promising points."""
+def by_effect(points: Sequence[Screened], starts: int, plays: int = 0) -> list[list[Screened]]:
+    """Grid points effect by effect, the most promising effects first, and of each the `starts` most promising points.
+
+    Of a play it is the `plays` most promising ones, where these are more.
+    """
     out: dict[tuple[str, str], list[Screened]] = {}
     for point in sorted(points, key=lambda p: -p.gain):
         out.setdefault(point.placed.key, []).append(point)
-    return [mine[:starts] for mine in out.values()]
+    return [mine[: max(starts, plays * mine[0].placed.effect.play)] for mine in out.values()]

@@ -6,7 +6,7 @@ import numpy as np
 
 from bench.discrepancy.fitting.map_fit import Fit
 from bench.discrepancy.likelihood.problem import Problem
-from bench.discrepancy.model.placement import Hypothesis
+from bench.discrepancy.model.placement import Hypothesis, Placed
 from bench.discrepancy.settings import DEFAULT, SearchSettings
 
 
@@ -57,10 +57,14 @@ def near(fitted: Fit) -> bool:
 
 def names(hypothesis: Hypothesis) -> str:
     """Readable names of a hypothesis."""
-    return (
-        " + ".join(p.effect.name + (f" ({p.place.name})" if p.place.name else "") for p in hypothesis)
-        or "nothing"
-    )
+    return " + ".join(p.effect.name + _where(p) for p in hypothesis) or "nothing"
+
+
+def _where(placed: Placed) -> str:
+    """Where an effect sits, in brackets; of a number that is wrong, which one."""
+    number = placed.target if placed.effect.site == "inertia" else ""
+    told = ": ".join(part for part in (placed.place.name, number) if part)
+    return f" ({told})" if placed.place.name else ""
 
 
 def sticks(fitted: Fit) -> bool:

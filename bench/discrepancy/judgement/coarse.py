@@ -20,6 +20,7 @@ from bench.discrepancy.fitting.goodness_of_fit import complexity
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
 from bench.discrepancy.judgement.finalists import (
     as_good,
+    believed,
     finalists,
     held_out_as,
     nominal_moves,
@@ -114,7 +115,10 @@ def judge(
     chosen, vetoed = nothing, False
     for own in sorted(within, key=_plainness):
         entry = _borne_out(_steady(own, case, rng), found, known)
-        if not entry.explanation.hypothesis or known.pays(entry.explanation, nothing.explanation, part):
+        alone = believed(nothing.explanation, entry.explanation, settings)
+        if not entry.explanation.hypothesis or known.pays(
+            entry.explanation, nothing.explanation, part, alone
+        ):
             found, chosen = _with(entry, own, found), entry
             alike = tuple(
                 other
@@ -152,10 +156,10 @@ def judge(
 def _doubts(chosen: Explanation, nothing: Explanation, known: Discrepancies) -> dict[tuple[str, str], float]:
     """Probability, for each effect of an explanation, that what it closes of the judging records is not its own."""
     settings, error = chosen.settings.judgement.coarse, chosen.settings.likelihood.error
-    moved = nominal_moves(chosen)
+    moved, alone = nominal_moves(chosen), believed(nothing, chosen, settings)
     out = dict[tuple[str, str], float]()
     for i, placed in enumerate(chosen.hypothesis):
-        size, left = known.part(chosen, nothing if len(chosen.hypothesis) == 1 else without(chosen, i))
+        size, left = known.part(chosen, alone if len(chosen.hypothesis) == 1 else without(chosen, i))
         doubt = outside(
             left, settings, besides=settings.besides * like_small_things(size, error), moved=moved
         )

@@ -181,9 +181,22 @@ def bounded(explanation: Explanation, within: float) -> Explanation:
     return Explanation(tuple(parts))
 
 
+def believed(nothing: Explanation, explanation: Explanation, settings: CoarseSettings) -> Explanation:
+    """The nominal model, its parameters moved no further than where a move is a finding, or than an explanation moves them itself.
+
+    A parameter that is moved further is no nominal model any more: it says itself that something is wrong, and may stand in for it.
+    """
+    within = max(settings.finding, _farthest(explanation))
+    return nothing if _farthest(nothing) <= within else bounded(nothing, within)
+
+
+def _farthest(explanation: Explanation) -> float:
+    return float(np.max(np.abs(nominal_moves(explanation)), initial=0.0))
+
+
 def strained(explanation: Explanation, within: float) -> bool:
     """Whether an explanation moves a nominal parameter by more than `within` of its stated standard deviations."""
-    return bool(np.any(np.abs(nominal_moves(explanation)) > within))
+    return _farthest(explanation) > within
 
 
 def nominal_moves(explanation: Explanation) -> Array:

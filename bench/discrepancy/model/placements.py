@@ -44,6 +44,12 @@ def placements(case: Case, structure: Structure, catalogue: Iterable[Effect]) ->
     return out
 
 
+def _innermost(structure: Structure, place: Place, mass: str) -> bool:
+    """Whether a place is the one where an inertia is asked for: of those that move it, the one that moves the fewest."""
+    moved = [other for other in structure.places if len(other.rows) == 1 and mass in other.mass]
+    return place is min(moved, key=lambda other: len(other.mass))
+
+
 def _finds_its_mass(structure: Structure, place: Place, effect: Effect) -> bool:
     """Whether a place has what an effect carries, if it carries anything: a nominal mass whose position in the room is the coordinate."""
     if effect.carried is None:
@@ -61,7 +67,8 @@ def _finds_its_mass(structure: Structure, place: Place, effect: Effect) -> bool:
 
 def _targets(case: Case, effect: Effect, structure: Structure, place: Place) -> list[str]:
     if effect.site == "inertia":
-        names = {"mass": place.mass, "stiffness": (place.stiffness,), "damping": (place.damping,)}[
+        masses = [name for name in place.mass if _innermost(structure, place, name)]
+        names = {"mass": masses, "stiffness": (place.stiffness,), "damping": (place.damping,)}[
             effect.quantity
         ]
         return [name for name in names if name in structure.parameters]

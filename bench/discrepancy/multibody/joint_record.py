@@ -41,7 +41,7 @@ JOINT_RECORD_SETTINGS = JointRecordSettings()
 
 def window_of(joint: Joint, sample: float) -> int:
     """Samples that a free run of a joint goes without drifting off; zero where a servo holds it, so that it goes for the whole record."""
-    servo = joint.drive is not None and joint.drive.servo
+    servo = joint.held
     return 0 if servo else max(2, round(JOINT_RECORD_SETTINGS.window / sample))
 
 

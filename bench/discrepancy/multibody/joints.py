@@ -48,6 +48,11 @@ class Joint(NamedTuple):
         """Whether its drive takes a torque, not a target."""
         return self.drive is not None and not self.drive.servo
 
+    @property
+    def held(self) -> bool:
+        """Whether a servo holds it."""
+        return self.drive is not None and self.drive.servo
+
 
 class Tie(NamedTuple):
     """A joint that another one moves by an equality of the model.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,12 +79,13 @@ def joint_doubts(own: Case, model: ArticulatedModel) -> list[str]:
             found.append(str(error))
             continue
         position = encoders.channels[0]
-        servo = joint.drive is not None and joint.drive.servo
+        servo = joint.held
+        motions = [np.asarray(record.values[position.name]) for record in own.identification]
+        found += _moves(joint.name, motions, float(position.noise_std or 0.0))
         for record in own.identification:
             q = np.asarray(record.values[position.name])
             u = np.asarray(record.values[driving.name])
             noise = float(position.noise_std or 0.0)
-            found += _moves(joint.name, record, q, noise)
             target = u / (joint.drive.gear or 1.0) if servo and joint.drive is not None else None
             found += position_doubts(position.name, record, noise, target)
             if servo:
@@ -96,10 +97,19 @@ def joint_doubts(own: Case, model: ArticulatedModel) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _moves(joint: str, record: CaseRecord, q: Array, noise: float) -> Iterator[str]:
-    if np.ptp(q) <= SETTINGS.still * max(noise, 1e-12):
-        yield f"joint '{joint}' hardly moves in '{record.name}': its friction, inertia and drive cannot be told from that"
+def _moves(joint: str, motions: Sequence[Array], noise: float) -> Iterator[str]:
+    """What the motion (n,) of a joint in the records cannot tell, taken together: it may well be held in some of them."""
+    moving = [q for q in motions if np.ptp(q) > SETTINGS.still * max(noise, 1e-12)]
+    if not moving:
+        yield f"joint '{joint}' hardly moves in any record: its friction, inertia and drive cannot be told from that"
         return
+    turns = sum(_reversals(q) for q in moving)
+    if turns < SETTINGS.reversals:
+        yield f"joint '{joint}' reverses {turns} time(s) in all; {SETTINGS.reversals} are wanted to tell friction from gravity"
+
+
+def _reversals(q: Array) -> int:
+    """How often a motion (n,) turns round, by more than a twentieth of its range."""
     smooth = np.convolve(q, np.ones(5) / 5.0, "valid")
     hysteresis = 0.05 * np.ptp(smooth)
     turns, last, rising = 0, smooth[0], True
@@ -112,10 +122,7 @@ def _moves(joint: str, record: CaseRecord, q: Array, noise: float) -> Iterator[s
             last = min(last, value)
             if value > last + hysteresis:
                 turns, last, rising = turns + 1, value, True
-    if turns < SETTINGS.reversals:
-        yield (
-            f"joint '{joint}' reverses {turns} time(s) in '{record.name}'; {SETTINGS.reversals} are wanted to tell friction from gravity"
-        )
+    return turns
 
 
 def _follows(joint: str, target: str, record: CaseRecord, q: Array, u: Array) -> Iterator[str]:

@@ -88,6 +88,8 @@ def _further(x: Array, target: Array, end: float) -> bool:
 def _ends(name: str, record: CaseRecord, target: Array | None) -> Iterator[str]:
     """A reading that is at times one and the same largest or smallest number, though it changes with every sample otherwise."""
     x = np.asarray(record.values[name])
+    if not np.ptp(x):  # a joint that was held
+        return
     if np.mean((np.diff(x) == 0.0) & (x[1:] > x.min()) & (x[1:] < x.max())) > SETTINGS.repeated:
         return
     for end in (float(x.max()), float(x.min())):

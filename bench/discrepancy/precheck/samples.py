@@ -49,8 +49,11 @@ def _torn(record: CaseRecord, name: str, settings: CheckSettings) -> Iterator[st
 def _frozen(record: CaseRecord, channel: CaseChannel, settings: CheckSettings) -> Iterator[str]:
     """A channel that stands still for a while, though it otherwise changes with every sample.
 
-    A joint that its friction holds reads one number, too, and a velocity of zero: it then sets off from where it is.
+    A joint that its friction holds reads one number, too, and a velocity of zero: it then sets off from where it is. A command rests
+    where it is told to.
     """
+    if channel.role == "command":
+        return
     name = channel.name
     x = np.asarray(record.values[name])
     same = np.diff(x) == 0.0

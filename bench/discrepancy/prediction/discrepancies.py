@@ -71,15 +71,24 @@ class Discrepancies:
         widest = int(np.argmax(lacking))
         return float(lacking[widest]), float((left[widest] / max(lacking[widest], 1e-300)) ** 2)
 
-    def pays(self, explanation: Explanation, nothing: Explanation, part: float) -> bool:
+    def pays(
+        self, explanation: Explanation, nothing: Explanation, part: float, believed: Explanation | None = None
+    ) -> bool:
         """Whether an explanation leaves at most a part of the judging records' discrepancy, beyond noise, on some coordinate and no
         more than all of it on any.
 
-        What shrinks is the discrepancy of the nominal model, its parameters re-estimated or as stated: without what is missing, to
-        re-estimate them may make it worse, and where it does, that is no harm of what is named.
+        What shrinks is the discrepancy of the nominal model, its parameters re-estimated as far as is believed or as stated: without
+        what is missing, to re-estimate them may make it worse, and where it does, that is no harm of what is named. No harm is done
+        to what the parameters leave wherever they go.
+
+        Args:
+            explanation: It.
+            nothing: The nominal model, its parameters re-estimated.
+            part: Largest part that may be left.
+            believed: The same, its parameters moved no further than is believed; `nothing` where None.
         """
         before, after = self._judged(nothing, explanation)
-        nearest = np.minimum(before, self.as_stated)
+        nearest = np.minimum(self.of(believed or nothing, judging=True), self.as_stated)
         shrinks = self._beyond(after) <= part * self._beyond(_at_rest(nearest))
         return bool(np.any(shrinks) and self._harm(before, after, explanation) <= 1.0)
 

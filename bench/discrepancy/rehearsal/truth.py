@@ -204,7 +204,7 @@ class _OfJoints:
     ) -> Mapping[str, Array]:
         compiled = applied.compiled()
         step = float(compiled.opt.timestep)
-        servos = all(joint.drive is not None and joint.drive.servo for joint in self.model.joints)
+        servos = all(joint.held for joint in self.model.joints)
         settling = round(SETTINGS.settling / step) if servos else 0
         steps = int(np.ceil((len(record) - 1) * record.step / step - 1e-9)) + 1
         columns = {

@@ -25,6 +25,11 @@ class CoarseSettings:
             "named as an error of that parameter."
         ),
     )
+    finding: float = setting(
+        3.0,
+        "The same, from which on a move is a finding: what an effect closes is held against a nominal model that moves no further.",
+        "Convention, that of articulated models.",
+    )
     stated_too_surely: float = setting(
         0.05,
         "Share of nominal parameters that may lie anywhere within these limits, whatever was stated of them.",
