@@ -259,3 +259,21 @@ def test_cogging_along_a_slide_has_a_pitch_in_metres(tmp_path):
     assert np.hypot(found.parameters["sine"].value, found.parameters["cosine"].value) == pytest.approx(
         6.0, rel=0.1
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("friction", "kind"), [(0.0, "none"), (LIMIT, "effect")])
+def test_encoders_that_are_noisier_than_stated_are_said_to_be_and_hide_nothing(tmp_path, friction, kind):
+    folder = write_case(tmp_path, mjcf(servo=True, friction=friction), servo=True)
+    document = json.loads((folder / "nominal.json").read_text())
+    for joint in ("shoulder", "elbow"):
+        document["channels"][f"{joint}_q"]["noise_std"] = NOISE / 2.0
+    (folder / "nominal.json").write_text(json.dumps(document))
+    verdict = diagnose(read_case(folder)).verdict
+    assert verdict.verdict == kind
+    assert not verdict.complete
+    if kind == "none":
+        said = [line for line in verdict.warnings if "larger than stated, by a factor of 2" in line]
+        assert len(said) == 2
+    else:
+        assert ("coulomb_friction", "elbow") in {(e.name, e.where) for e in verdict.named}

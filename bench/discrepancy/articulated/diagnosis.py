@@ -16,6 +16,7 @@ import numpy as np
 from bench.discrepancy.articulated.admission import admitted_robot
 from bench.discrepancy.articulated.explaining import Explained, Question, asked_as, explained
 from bench.discrepancy.articulated.held_inputs import HELD, explained_as_held
+from bench.discrepancy.articulated.louder_noise import explained_with_louder_noise
 from bench.discrepancy.articulated.naming import closest_rival
 from bench.discrepancy.articulated.next_test import JointProposal, Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
@@ -113,11 +114,15 @@ def diagnose_articulated(
         question = Question(judging, how, rng, stated, progress)
         return explained(problem, placements(problem, catalogue), question)
 
+    def in_steps(case: Case) -> ArticulatedProblem:
+        return stepped(case, model, settings, deadline)
+
     def asked(case: Case) -> Explained:
         """In steps that are short enough, for the nominal model, for what is named and for a drive that longer ones cannot follow."""
-        problem = stepped(case, model, settings, deadline)
-        found = explain(problem)
-        if problem.settings is settings:
+        problem = in_steps(case)
+        louder = explained_with_louder_noise(problem, in_steps, explain, progress) if stated else None
+        found = louder or explain(problem)
+        if problem.settings is settings or louder is not None:
             return found
         finer = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
         if _accurate(problem, found, settings) and (

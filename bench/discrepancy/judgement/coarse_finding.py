@@ -41,13 +41,13 @@ def coarse_finding(
     """
     factors = _noise_over_stated(problem, explanations[0])
     threshold = problem.settings.judgement.noise_understated
-    understated = _larger_than_stated(factors, threshold)
+    understated = louder_than_stated(factors, threshold)
     judged = judge(case, problem, explanations, rng, trusted=problem.noise_stated and not understated)
     chosen, nearest = judged.chosen.explanation, _nearest(judged)
     probabilities = _marginal(judged)
     untouched = not chosen.hypothesis and not judged.vetoed
     noise = untouched and _explained_by_noise(problem, factors)
-    understated = _larger_than_stated(factors, 1.0) if noise else understated
+    understated = louder_than_stated(factors, 1.0) if noise else understated
     right = untouched and not noise and _right_as_a_model_can_be(problem, judged, factors)
     kind = "none" if noise or right else _kind(problem, judged)
     doubted = kind == "effect" and deadline.allows("free forces in place of the laws")
@@ -148,7 +148,7 @@ def _noise_over_stated(problem: Problem, best: Explanation) -> dict[str, float]:
     return factors
 
 
-def _larger_than_stated(factors: Mapping[str, float], threshold: float) -> tuple[str, ...]:
+def louder_than_stated(factors: Mapping[str, float], threshold: float) -> tuple[str, ...]:
     """Channels whose noise is larger than stated by more than a factor, in words."""
     return tuple(
         f"the noise of '{name}' is larger than stated, by a factor of {factor:.2g}: hardly anywhere in its spectrum does an "
