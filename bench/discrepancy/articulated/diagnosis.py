@@ -14,18 +14,15 @@ import mujoco
 import numpy as np
 
 from bench.discrepancy.articulated.admission import admitted_robot
-from bench.discrepancy.articulated.explaining import Explained, Question, asked_as, explained
+from bench.discrepancy.articulated.asking import Asking
+from bench.discrepancy.articulated.explaining import Explained, asked_as
 from bench.discrepancy.articulated.held_inputs import HELD, explained_as_held
-from bench.discrepancy.articulated.louder_noise import explained_with_louder_noise
 from bench.discrepancy.articulated.naming import closest_rival
 from bench.discrepancy.articulated.next_test import JointProposal, Trajectory, propose
 from bench.discrepancy.articulated.places import matrix_of
-from bench.discrepancy.articulated.stepping import accurate, misses_a_drive, stepped
 from bench.discrepancy.articulated_effects.catalogue import CATALOGUE
 from bench.discrepancy.articulated_judgement.predicted_errors import predict
-from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
-from bench.discrepancy.articulated_search.placements import placements
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.checks.long_records import after, long_record_notes, thinned, with_beginnings
@@ -108,34 +105,11 @@ def diagnose_articulated(
     told, compiled, notes = admitted_robot(case, anyway=anyway, settings=settings)
     model = ArticulatedModel.of(compiled, case.rig)
     case = with_beginnings(whole := thinned(told, settings=settings), settings=settings)
-
-    def explain(problem: ArticulatedProblem) -> Explained:
-        judging = ArticulatedProblem.of(problem.case, model, problem.case.validation, problem.settings)
-        question = Question(judging, how, rng, stated, progress)
-        return explained(problem, placements(problem, catalogue), question)
-
-    def in_steps(case: Case) -> ArticulatedProblem:
-        return stepped(case, model, settings, deadline)
-
-    def asked(case: Case) -> Explained:
-        """In steps that are short enough, for the nominal model, for what is named and for a drive that longer ones cannot follow."""
-        problem = in_steps(case)
-        louder = explained_with_louder_noise(problem, in_steps, explain, progress) if stated else None
-        found = louder or explain(problem)
-        if problem.settings is settings or louder is not None:
-            return found
-        finer = ArticulatedProblem.of(case, model, case.identification, settings, deadline)
-        if _accurate(problem, found, settings) and (
-            found.verdict.complete
-            or not misses_a_drive(finer, found.final, placements(finer, catalogue), progress)
-        ):
-            return found
-        return explain(finer)
-
-    found = asked(case)
+    asking = Asking(model, catalogue, how, rng, stated, settings, deadline, progress)
+    found = asking.asked(case)
     steps_kept = all(a.step == b.step for a, b in zip(told.identification, case.identification, strict=True))
     # of samples that were thinned none was held
-    held = explained_as_held(case, found, asked, progress) if steps_kept else None
+    held = explained_as_held(case, found, asking.asked, progress) if steps_kept else None
     if held is not None:
         found, notes = held, (*notes, HELD)
     problem, fits, final, verdict = found.problem, found.fits, found.final, found.verdict
@@ -162,15 +136,6 @@ def _next_test(compiled: mujoco.MjModel, found: Explained) -> JointProposal | No
     if rival is None or not problem.deadline.allows("the next test"):
         return None
     return propose(problem, compiled, found.final, rival)
-
-
-def _accurate(problem: ArticulatedProblem, found: Explained, settings: DiagnosisSettings) -> bool:
-    """Whether the steps of a problem are short enough for what is named by its runs, or none finer are to be had."""
-    by_torque = isinstance(found.problem, TorqueProblem)
-    nominal = next(fit for fit in found.fits if not fit.hypothesis)
-    if by_torque or accurate(problem, nominal, found.final, settings):
-        return True
-    return not problem.deadline.allows("the same once more in finer integration steps")
 
 
 def _of_long_records(told: Case, whole: Case, found: Explained) -> tuple[str, ...]:

@@ -84,7 +84,7 @@ def misses_a_drive(
         candidates: Effects at places; those that are elastic drives are asked.
         progress: Called with a line of text at every joint.
     """
-    search, judged = finer.settings.articulated.search, finer.settings.articulated.judgement
+    settings, judged = finer.settings.articulated.search, finer.settings.articulated.judgement
 
     def again(fitted: ArticulatedFit, keep: Callable[[PlacedOnJoint], bool]) -> ArticulatedFit:
         etas = finer.etas(fitted.hypothesis, fitted.vector)
@@ -101,10 +101,10 @@ def misses_a_drive(
             continue
         progress(f"joint '{finer.joints[j].name}' in finer steps")
         rest = again(whole, lambda placed, j=j: placed.joint != j)
-        least = whole.log_posterior - search.sight
+        least = whole.log_posterior - settings.sight
         told = best_of(
-            finer, rest, grounds_of(finer, rest, search), trains, search, lambda text: None, least=least
+            finer, rest, grounds_of(finer, rest, settings), trains, settings, lambda text: None, least=least
         )
-        if told.best is not None and told.best.log_posterior > whole.log_posterior + search.worth:
+        if told.best is not None and told.best.log_posterior > whole.log_posterior + settings.worth:
             return True
     return False

@@ -209,12 +209,12 @@ class _Fitting:
         reach = np.where(self.free < len(problem.nominal), settings.nominal_reach, settings.effect_reach)
         every = np.concatenate([*units, np.ones(len(shared) * len(self.passive))])
         known = None if self.jacobian is None else self.jacobian / every[:, None]
-        numerics = problem.settings.numerics
+        chosen = problem.settings.numerics
         if any(placed.effect.play and problem.joints[placed.joint].held for placed in self.hypothesis):
-            numerics = replace(numerics, differences=numerics.rough)
+            chosen = replace(chosen, differences=chosen.rough)
         found = minimise(
             residual_at, start, prior=Prior(mean, std, low, high), free=self.free, reach=reach, iterations=iterations, limit=limit,
-            deadline=problem.deadline, settings=numerics, known=known)  # fmt: skip
+            deadline=problem.deadline, settings=chosen, known=known)  # fmt: skip
         self.jacobian = None if found.jacobian is None else found.jacobian * every[:, None]
         return _summary(self, found.vector, found.curvature)
 

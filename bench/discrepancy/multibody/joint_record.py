@@ -41,8 +41,7 @@ JOINT_RECORD_SETTINGS = JointRecordSettings()
 
 def window_of(joint: Joint, sample: float) -> int:
     """Samples that a free run of a joint goes without drifting off; zero where a servo holds it, so that it goes for the whole record."""
-    servo = joint.held
-    return 0 if servo else max(2, round(JOINT_RECORD_SETTINGS.window / sample))
+    return 0 if joint.held else max(2, round(JOINT_RECORD_SETTINGS.window / sample))
 
 
 def judged_from(window: int, samples: int) -> int:
@@ -185,12 +184,9 @@ class JointRecord:
     @property
     def servo_command(self) -> Array:
         """The input (n_steps,), that of a servo less the offset of its encoder."""
-        drive, wrong = self.joint.drive, self.encoder.in_loop > 0.5
-        return (
-            self.command - drive.gear * self.encoder.offset
-            if wrong and drive and drive.servo
-            else self.command
-        )
+        drive = self.joint.drive
+        wrong = self.joint.held and self.encoder.in_loop > 0.5
+        return self.command - drive.gear * self.encoder.offset if drive and wrong else self.command
 
     @property
     def servo_ratio(self) -> float:
