@@ -25,6 +25,11 @@ MADE = {
         GRADED.format("fourth_", "fourth-laboratory"),
         "python scripts/fourth_laboratory.py out/fourth-laboratory",
     ),
+    "fifth_laboratory": (
+        "Cases of a fifth author, who knew nothing of the diagnosis: drives, struts, mounts, shafts, a pendulum, a beam",
+        GRADED.format("fifth_", "fifth-laboratory"),
+        "python scripts/fifth_laboratory.py out/fifth-laboratory",
+    ),
     "second_robots": (
         "Cases of a second author, who knew nothing of the diagnosis: robots",
         GRADED.format("ptz vee scar hop dsk gan", "second-robots/cases"),

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from third_laboratory_cases.logger import Table
-from third_laboratory_cases.writing import stated_noise
+from third_laboratory_cases.writing import stated_noise, written
 
 from bench.files import write_text
 from fourth_laboratory_cases.case import WRITING, Case, Excited
@@ -30,15 +27,6 @@ empty `right`.
 """
 
 
-def written(table: Table) -> str:
-    """A record as comma-separated values."""
-    text = io.StringIO()
-    formats, header = ["%.7f", *("%.7g" for _ in table.columns)], ",".join(["time", *table.columns])
-    values = np.column_stack([table.t, *table.columns.values()])
-    np.savetxt(text, values, formats, ",", header=header, comments="")
-    return text.getvalue()
-
-
 def write_case(case: Case, all_excited: Sequence[Excited], folder: Path, seed: int) -> None:
     """Write the folder of a case, from its excited records and the seed of nominal values, clocks and noise."""
     rng = case.generator(WRITING, seed)
@@ -53,7 +41,7 @@ def write_case(case: Case, all_excited: Sequence[Excited], folder: Path, seed: i
     if case.model is not None:
         write_text(folder / case.rig, case.model(nominal))
     for stem, signals in records.items():
-        write_text(folder / f"{stem}.csv", written(logged(case, stem, signals, levels, rng)))
+        write_text(folder / f"{stem}.csv", written(logged(case, stem, signals, levels, rng), value="%.7g"))
 
 
 def in_words(sizes: Sizes) -> str:

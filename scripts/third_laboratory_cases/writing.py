@@ -104,10 +104,10 @@ def logged(case: Case, signals: Signals, levels: Mapping[str, float], rng: np.ra
     return table
 
 
-def written(table: Table) -> str:
-    """A record as comma-separated values."""
+def written(table: Table, *, time: str = "%.7f", value: str = "%.8g") -> str:
+    """A record as comma-separated values, in some formats."""
     text = io.StringIO()
-    formats, header = ["%.7f", *("%.8g" for _ in table.columns)], ",".join(["time", *table.columns])
+    formats, header = [time, *(value for _ in table.columns)], ",".join(["time", *table.columns])
     values = np.column_stack([table.t, *table.columns.values()])
     np.savetxt(text, values, formats, ",", header=header, comments="")
     return text.getvalue()

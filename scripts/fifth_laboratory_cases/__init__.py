@@ -1,0 +1,1 @@
+"""The cases of the fifth laboratory: their physics, their integration, their loggers, and what is right of each."""
