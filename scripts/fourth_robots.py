@@ -14,55 +14,24 @@ the nominal models; the largest difference is printed.
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
 from pathlib import Path
-
-import tyro
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "scripts"))
 
+from fourth_robots_cases.answers import in_lines  # noqa: E402
 from fourth_robots_cases.cases import RobotCase, robot_cases  # noqa: E402
 from fourth_robots_cases.making import MadeRobotCase, make, write  # noqa: E402
 from fourth_robots_cases.mjcf import against_mujoco  # noqa: E402
-from robot_case_sets import SetArgs, in_words, shown, write_set  # noqa: E402
+from robot_case_sets import in_words, make_set  # noqa: E402
 
 
-@dataclass(frozen=True)
-class Args(SetArgs):
-    """Write the cases and their answers."""
-
-    seed: int = 0
-    """Added to the seed of each case; 0 gives the cases that README.md describes."""
-
-
-def told(made: MadeRobotCase) -> str:
-    """Sizes of the effects by joint, a line for each record."""
-    lines = []
-    for record, size in made.sizes.items():
-        rows = (
-            ("main", size.main),
-            ("main/noise", size.main_over_noise),
-            ("background", size.background_friction),
-        )
-        sized = ", ".join(f"{name} {shown(row)}" for name, row in rows)
-        lines.append(f"    {record} ({size.unit}): {sized}\n")
-    return "".join(lines)
-
-
-def main() -> int:
-    """Make the cases one after another."""
-    args = tyro.cli(Args, description=__doc__)
-
-    def written(case: RobotCase) -> str:
-        made = make(case, args.seed)
-        write(made, args.cases, args.answers)
-        return in_words(case.kind, against_mujoco(case.robot), told(made))
-
-    rules = Path(__file__).parent / "fourth_robots_cases" / "acceptance.json"
-    write_set(robot_cases(), only=args.only, rules=rules, cases=args.cases, write=written)
-    return 0
+def told(case: RobotCase, made: MadeRobotCase) -> str:
+    """What is printed of a case."""
+    return in_words(case.kind, against_mujoco(case.robot), in_lines(made.sizes))
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    raise SystemExit(
+        make_set(__doc__, "fourth_robots_cases", robot_cases(), make=make, write=write, told=told)
+    )

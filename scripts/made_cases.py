@@ -45,5 +45,10 @@ MADE = {
         GRADED.format("finger crane wrist balanced stage ankle", "fourth-robots/cases"),
         "python scripts/fourth_robots.py out/fourth-robots/cases out/fourth-robots/answers",
     ),
+    "fifth_robots": (
+        "Cases of a fifth author, who knew nothing of the diagnosis: robots",
+        GRADED.format("fifth_", "fifth-robots/cases"),
+        "python scripts/fifth_robots.py out/fifth-robots/cases out/fifth-robots/answers",
+    ),
 }
 """By name: title of the capability, its command, and the command that makes its cases."""

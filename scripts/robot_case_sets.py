@@ -19,6 +19,7 @@ from bench.errors import BenchError, UnknownNameError
 from bench.files import write_text
 
 _Case = TypeVar("_Case")
+_Made = TypeVar("_Made")
 
 RECORDS = ("identification", "identification_2", "validation")
 """Records of a case; the last one judges."""
@@ -38,6 +39,14 @@ class SetArgs:
     """Folder for the answers."""
     only: tuple[str, ...] = ()
     """Names of cases; all where none is given."""
+
+
+@dataclass(frozen=True)
+class SeededArgs(SetArgs):
+    """Write the cases and their answers."""
+
+    seed: int = 0
+    """Added to the seed of each case; 0 gives the cases that README.md describes."""
 
 
 def write_set(
@@ -66,6 +75,40 @@ def write_set(
     write_text(cases / "acceptance.json", rules.read_text(encoding="utf-8"))
     for name in only or known:
         print(f"{name}: {write(known[name])}", end="", flush=True)
+
+
+def make_set(
+    description: str | None,
+    package: str,
+    known: Mapping[str, _Case],
+    *,
+    make: Callable[[_Case, int], _Made],
+    write: Callable[[_Made, Path, Path], None],
+    told: Callable[[_Case, _Made], str],
+) -> int:
+    """The command of a set.
+
+    Args:
+        description: What `--help` says.
+        package: Folder of its acceptance.json.
+        known: Cases by name.
+        make: Simulates a case, with a number that is added to its seed.
+        write: Writes what was made into the folders for cases and for answers.
+        told: What is printed of a case.
+
+    Returns:
+        The exit status.
+    """
+    args = tyro.cli(SeededArgs, description=description)
+
+    def written(case: _Case) -> str:
+        made = make(case, args.seed)
+        write(made, args.cases, args.answers)
+        return told(case, made)
+
+    rules = Path(__file__).parent / package / "acceptance.json"
+    write_set(known, only=args.only, rules=rules, cases=args.cases, write=written)
+    return 0
 
 
 def in_words(kind: str, difference: float, told: str) -> str:

@@ -10,9 +10,10 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from robot_case_sets import shown
 
 from bench.arrays import Array
-from fourth_robots_cases.cases import RobotCase
+from fourth_robots_cases.cases import BasicCase, RobotCase
 from fourth_robots_cases.faults import with_faults
 from fourth_robots_cases.machine import Machine
 from fourth_robots_cases.plant import Parameters, machine_of
@@ -95,9 +96,21 @@ class Parts(NamedTuple):
 
 def sizes(case: RobotCase, measured: Measured) -> Sizes:
     """Sizes of the effects in a record."""
-    trace, servos = measured.trace, case.robot.has_servos
-    parts = _of_positions(case, measured) if servos else _of_torques(case, measured)
-    whole = np.ones_like(measured.torque) if servos else measured.torque
+    parts = _of_positions(case, measured) if case.robot.has_servos else _of_torques(case, measured)
+    return sizes_of(case, parts, measured.torque, measured.trace)
+
+
+def sizes_of(case: BasicCase, parts: Parts, torque: Array, trace: Trace) -> Sizes:
+    """Sizes in a record.
+
+    Args:
+        case: The case.
+        parts: What makes positions, where servos follow goals, or torques.
+        torque: Torques of which the latter are told as parts [N m or N] (n).
+        trace: What the robot did.
+    """
+    servos = case.robot.has_servos
+    whole = np.ones_like(torque) if servos else torque
     stopped = _share(case, "one_sided_stop", lambda j, told: trace.position[:, j] > told["place"])
     between = np.abs(trace.motor - trace.position)
     loose = _share(case, "backlash", lambda j, told: between[:, j] < told["gap"] / 2)
@@ -161,7 +174,7 @@ def _of_torques(case: RobotCase, measured: Measured) -> Parts:
     )
 
 
-def _share(case: RobotCase, name: str, within: Callable[[int, Mapping[str, Any]], Array]) -> float | None:
+def _share(case: BasicCase, name: str, within: Callable[[int, Mapping[str, Any]], Array]) -> float | None:
     """Share of the samples that are within something at the joint of a fault of a name; None where there is no such fault."""
     for fault in case.faults:
         if fault.name == name:
@@ -174,16 +187,32 @@ def rounded(values: Array) -> list[float]:
     return [float(f"{x:.4g}") for x in values]
 
 
+def in_lines(records: Mapping[str, Sizes]) -> str:
+    """Sizes of the effects by joint, a line for each record."""
+    lines = []
+    for record, size in records.items():
+        rows = (
+            ("main", size.main),
+            ("main/noise", size.main_over_noise),
+            ("background", size.background_friction),
+        )
+        sized = ", ".join(f"{name} {shown(row)}" for name, row in rows)
+        lines.append(f"    {record} ({size.unit}): {sized}\n")
+    return "".join(lines)
+
+
 def answer_document(
-    case: RobotCase, parameters: Parameters, friction: Array, torque: Array, records: Mapping[str, Sizes]
-) -> dict[str, Any]:
+    case: BasicCase, parameters: Mapping[str, Array], friction: Array, torque_noise: Array, clock: str,
+    records: Mapping[str, Sizes],
+) -> dict[str, Any]:  # fmt: skip
     """The answer.
 
     Args:
         case: The case.
         parameters: Of the robot, without faults.
         friction: Dry friction of the background [N m or N] (n).
-        torque: Root mean square of the torques without faults and background, over all records [N m or N] (n).
+        torque_noise: Standard deviation of the noise of measured torques [N m or N] (n).
+        clock: Of the log.
         records: Sizes of the effects by record.
     """
     robot = case.robot
@@ -202,12 +231,12 @@ def answer_document(
         "noise": {
             "stated": STATED[case.stated],
             "position": list(case.position_noise),
-            "torque": None if robot.has_servos else rounded(case.torque_noise * torque),
+            "torque": None if robot.has_servos else rounded(torque_noise),
         },
-        "clock": case.clock,
+        "clock": clock,
         "true": {
             name: values.tolist() if values.ndim > 1 else rounded(values)
-            for name, values in parameters._asdict().items()
+            for name, values in parameters.items()
         },
         "sizes": {
             record: {name: size for name, size in found._asdict().items() if size is not None}

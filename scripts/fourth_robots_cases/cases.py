@@ -18,6 +18,7 @@ from fourth_robots_cases.faults import (
     damping_error,
     hose,
     joint_compliance,
+    kind_of,
     one_sided_stop,
     servo_gain_error,
     stribeck_friction,
@@ -32,53 +33,58 @@ MIXED: tuple[Plan, Plan, Plan] = ("multisine", "moves", "mixed")
 
 
 @dataclass(frozen=True, kw_only=True)
-class RobotCase:
-    """A case before it is simulated.
+class BasicCase:
+    """What a case of any set of robots has.
 
     Attributes:
         name: Of its folder.
         robot: The robot.
         seed: Of all its random numbers.
         faults: What is wrong with it.
-        background: Dry friction at every joint, over the root mean square of its torque or force.
         rate: Samples a second [Hz].
-        seconds: Duration of a record [s].
-        course: How the joints move.
-        plans: Motions of the two records for identification and of the one for validation.
-        clock: Of the log.
         side: Side of the transmission on which positions are logged, which is stated; servos read the motor side.
         position_noise: Standard deviation of the noise of each position [rad or m].
-        torque_noise: That of torques or currents, over their root mean square; servos log goals, which have none.
         stated: Noise as it is stated over what it is; None where it is not stated.
-        degrees: Whether the log is in degrees.
-        counts: One count of each encoder [rad or m], which is stated; None where positions are not rounded.
     """
 
     name: str
     robot: Robot
     seed: int
     faults: tuple[Fault, ...] = ()
-    background: float
     rate: int
+    side: Literal["motor", "link"]
+    position_noise: tuple[float, ...]
+    stated: float | None
+
+    @property
+    def kind(self) -> Literal["single", "double", "foreign", "none"]:
+        """See `kind_of`."""
+        return kind_of(self.faults)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotCase(BasicCase):
+    """A case before it is simulated.
+
+    Attributes:
+        background: Dry friction at every joint, over the root mean square of its torque or force.
+        seconds: Duration of a record [s].
+        course: How the joints move.
+        plans: Motions of the two records for identification and of the one for validation.
+        clock: Of the log.
+        torque_noise: Noise of torques or currents over their root mean square; servos log goals, which have none.
+        degrees: Whether the log is in degrees.
+        counts: One count of each encoder [rad or m], which is stated; None where positions are not rounded.
+    """
+
+    background: float
     seconds: int
     course: Course
     plans: tuple[Plan, Plan, Plan] = MIXED
     clock: Clock
-    side: Literal["motor", "link"]
-    position_noise: tuple[float, ...]
     torque_noise: float = 0.0
-    stated: float | None
     degrees: bool = False
     counts: tuple[float | None, ...] | None = None
-
-    @property
-    def kind(self) -> Literal["single", "double", "foreign", "none"]:
-        """One effect, two, one that the catalogue of the diagnosis lacks (foreign), or none."""
-        if not self.faults:
-            return "none"
-        if not all(fault.named for fault in self.faults):
-            return "foreign"
-        return "double" if len(self.faults) > 1 else "single"
 
     @property
     def encoder_counts(self) -> tuple[float | None, ...]:

@@ -66,6 +66,21 @@ def rotation(axis: Array, angle: float) -> Array:
 
 
 @njit(cache=True)
+def partial_velocities(
+    slide: NDArray[np.bool_], axes: Array, joints: Array, centre: Array
+) -> tuple[Array, Array]:
+    """Partial velocities of a centre of mass and of the rotation of its body, see `add_body`; each (n_joints, 3)."""
+    linear, angular = np.zeros(axes.shape), np.zeros(axes.shape)
+    for k in range(len(slide)):
+        if slide[k]:
+            linear[k] = axes[k]
+        else:
+            linear[k] = cross(axes[k], centre - joints[k])
+            angular[k] = axes[k]
+    return linear, angular
+
+
+@njit(cache=True)
 def add_body(
     matrix: Array, bias: Array, slide: NDArray[np.bool_], axes: Array, joints: Array, centre: Array,
     mass: float, inertia: Array, force: Array, moment: Array,
@@ -84,13 +99,7 @@ def add_body(
         force, moment: Its inertial force [N] (3) and moment [N m] (3) where no joint accelerates.
     """
     count = len(slide)
-    linear, angular = np.zeros((count, 3)), np.zeros((count, 3))
-    for k in range(count):
-        if slide[k]:
-            linear[k] = axes[k]
-        else:
-            linear[k] = cross(axes[k], centre - joints[k])
-            angular[k] = axes[k]
+    linear, angular = partial_velocities(slide, axes, joints, centre)
     for k in range(count):
         bias[k] += np.dot(linear[k], force) + np.dot(angular[k], moment)
         turned = inertia @ angular[k]

@@ -31,7 +31,10 @@ def largest_impulses(friction: Friction, v: Array, motor: NDArray[np.int64], ste
 
 
 @njit(cache=True)
-def stick(v: Array, impulse: Array, top: Array, inverse: NDArray[np.floating]) -> Array:
+def stick(
+    v: Array, impulse: Array, top: Array, inverse: NDArray[np.floating],
+    sweeps: int = SWEEPS, converged: float = CONVERGED,
+) -> Array:  # fmt: skip
     """Velocities at the end of a step with friction (n_coordinates).
 
     Args:
@@ -39,6 +42,8 @@ def stick(v: Array, impulse: Array, top: Array, inverse: NDArray[np.floating]) -
         impulse: Impulses of the step before; those of this one afterwards (n_coordinates).
         top: Their limits (n_coordinates).
         inverse: Inverse of the inertia (n_coordinates, n_coordinates).
+        sweeps: Most sweeps.
+        converged: Largest change of an impulse, over its limit, at which they end.
     """
     v = v + inverse @ impulse
     for m in range(len(v)):
@@ -46,7 +51,7 @@ def stick(v: Array, impulse: Array, top: Array, inverse: NDArray[np.floating]) -
         if within != impulse[m]:
             v = v + inverse[:, m] * (within - impulse[m])
             impulse[m] = within
-    for _ in range(SWEEPS):
+    for _ in range(sweeps):
         settled = True
         for m in range(len(v)):
             if top[m] <= 0:
@@ -57,7 +62,7 @@ def stick(v: Array, impulse: Array, top: Array, inverse: NDArray[np.floating]) -
                 for k in range(len(v)):
                     v[k] += inverse[k, m] * change
                 impulse[m] = within
-                if abs(change) > CONVERGED * top[m]:
+                if abs(change) > converged * top[m]:
                     settled = False
         if settled:
             break

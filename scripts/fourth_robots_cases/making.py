@@ -69,7 +69,9 @@ def make(case: RobotCase, shift: int = 0) -> MadeRobotCase:
         found[name] = sizes(case, Measured(parameters, nominal, friction, torque, trace, again))
         rng = np.random.default_rng([seed, 60 + k])
         tables[name] = logged(rng, case, seed, clock.ticks, parameters.gear, torque_std, trace)
-    answer = answer_document(case, parameters, friction, torque, found)
+    answer = answer_document(
+        case, parameters._asdict(), friction, case.torque_noise * torque, case.clock, found
+    )
     return MadeRobotCase(case, tables, nominal_document(case, torque_std), found, answer)
 
 

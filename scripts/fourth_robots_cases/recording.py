@@ -17,6 +17,7 @@ from scipy.signal import lfilter
 from bench.arrays import Array
 from bench.files import write_bytes
 from fourth_robots_cases.cases import RobotCase
+from fourth_robots_cases.robots import Robot
 from fourth_robots_cases.stepping import Trace
 
 HUM = 49.97
@@ -42,15 +43,13 @@ COLOURS = Colour(0.6, 0.012), Colour(0.45, 0.03), Colour(0.7, 0.02)
 
 def headings(case: RobotCase) -> list[str]:
     """Columns of a record in their order: time, goals, currents or torques, and positions."""
-    return ["time", *command_headings(case), *case.robot.joints]
+    return ["time", *command_headings(case.robot), *case.robot.joints]
 
 
-def command_headings(case: RobotCase) -> list[str]:
+def command_headings(robot: Robot) -> list[str]:
     """Columns of goals, currents or torques; a joint that nothing drives has one of its torque, which is zero."""
     ending = {"position": "goal", "velocity": "rate_goal", "current": "current", "torque": "torque"}
-    return [
-        f"{link.joint}_{ending[case.robot.drive] if link.driven else 'torque'}" for link in case.robot.links
-    ]
+    return [f"{link.joint}_{ending[robot.drive] if link.driven else 'torque'}" for link in robot.links]
 
 
 def noise(rng: np.random.Generator, std: float, samples: int, rate: int, colour: Colour, hum: float) -> Array:

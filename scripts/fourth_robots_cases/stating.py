@@ -65,7 +65,7 @@ def _parameters(robot: Robot) -> dict[str, dict[str, Any]]:
 
 def _commands(case: RobotCase, torque_std: Array) -> dict[str, dict[str, Any]]:
     found, drive = {}, case.robot.drive
-    for j, (heading, link) in enumerate(zip(command_headings(case), case.robot.links, strict=True)):
+    for j, (heading, link) in enumerate(zip(command_headings(case.robot), case.robot.links, strict=True)):
         channel: dict[str, Any] = {"actuator": actuator_name(link, drive)}
         if not link.driven:
             channel |= {"unit": "N m", "role": "measured", "noise_std": 0.0}

@@ -1,0 +1,1 @@
+"""Cases of a fifth author's robots for the diagnosis, simulated without the bench and without MuJoCo."""
