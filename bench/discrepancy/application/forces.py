@@ -18,6 +18,7 @@ from bench.discrepancy.application.target import (
     as_mujoco,
     with_first,
 )
+from bench.discrepancy.articulated_effects.slot_setters import periods
 from bench.discrepancy.verdict import NamedEffect
 from bench.laws.carried_mass import spring_and_damper
 from bench.rig.bodies import moved_by
@@ -245,8 +246,7 @@ def element(target: Target, effect: NamedEffect) -> Change:
         law, theta = "lugre", (v["limit"], v["stiffness"], v["damping"], 0.0, 1.0, 0.0)
     elif not law and effect.name == "cogging":
         amplitude, phase = math.hypot(v["sine"], v["cosine"]), math.atan2(v["cosine"], v["sine"])
-        pitch = v["pitch"] if "pitch" in v else 2.0 * math.pi / v["periods_per_turn"]
-        law, theta = "cogging", (amplitude, pitch, phase)
+        law, theta = "cogging", (amplitude, 2.0 * math.pi / periods(v), phase)
     if not law:
         return Change(
             effect.name, name, "none", "neither MuJoCo nor the bench has a form of it; correct it where it is"

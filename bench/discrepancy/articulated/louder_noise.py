@@ -21,10 +21,7 @@ from bench.discrepancy.case.case import Case
 from bench.discrepancy.judgement.coarse_finding import louder_than_stated
 from bench.discrepancy.multibody.encoders import encoders_of, noise_of
 
-LOUDER = (
-    "Nothing is missing from the model: with its parameters re-estimated it leaves white noise at every joint, and that noise is larger "
-    "than stated."
-)
+LOUDER = "Nothing is missing from the model: with its parameters re-estimated it leaves white noise alone, and more of it than was stated."
 
 
 def explained_with_louder_noise(
