@@ -11,7 +11,7 @@ from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.rounds import best_of, grounds_of, quiet
-from bench.discrepancy.articulated_search.search import nominal_fit
+from bench.discrepancy.articulated_search.search import nominal_fit, taken_out
 from bench.discrepancy.case.case import Case
 from bench.discrepancy.multibody.model import ArticulatedModel
 from bench.discrepancy.numerics.deadline import Deadline
@@ -86,21 +86,17 @@ def misses_a_drive(
     """
     settings, judged = finer.settings.articulated.search, finer.settings.articulated.judgement
 
-    def again(fitted: ArticulatedFit, keep: Callable[[PlacedOnJoint], bool]) -> ArticulatedFit:
-        etas = finer.etas(fitted.hypothesis, fitted.vector)
-        kept = [(p, eta) for p, eta in zip(fitted.hypothesis, etas, strict=True) if keep(p)]
-        hypothesis = tuple(p for p, _ in kept)
-        vector = np.concatenate([fitted.vector[: len(finer.nominal)], *(eta for _, eta in kept)])
-        scale = ArticulatedFit.at(finer, hypothesis, vector).scale
-        return refitted(finer, hypothesis, vector, scale=scale)
+    def again(fitted: ArticulatedFit, without: Sequence[PlacedOnJoint]) -> ArticulatedFit:
+        rest = taken_out(finer, fitted, without)
+        return refitted(finer, rest.hypothesis, rest.vector, scale=rest.scale)
 
-    whole = again(found, lambda placed: True)
+    whole = again(found, ())
     for j in np.flatnonzero(~quiet(whole, judged)):
         trains = [c for c in candidates if c.effect.train and c.joint == j]
         if not (trains and finer.deadline.allows("elastic drives in finer integration steps")):
             continue
         progress(f"joint '{finer.joints[j].name}' in finer steps")
-        rest = again(whole, lambda placed, j=j: placed.joint != j)
+        rest = again(whole, [placed for placed in whole.hypothesis if placed.joint == j])
         least = whole.log_posterior - settings.sight
         told = best_of(
             finer, rest, grounds_of(finer, rest, settings), trains, settings, lambda text: None, least=least

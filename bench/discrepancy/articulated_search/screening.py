@@ -185,4 +185,5 @@ def by_effect(points: Sequence[Screened], starts: int, plays: int = 0) -> list[l
     out: dict[tuple[str, str], list[Screened]] = {}
     for point in sorted(points, key=lambda p: -p.gain):
         out.setdefault(point.placed.key, []).append(point)
-    return [mine[: max(starts, plays * mine[0].placed.effect.play)] for mine in out.values()]
+    most = {False: starts, True: max(starts, plays)}
+    return [mine[: most[mine[0].placed.effect.play]] for mine in out.values()]

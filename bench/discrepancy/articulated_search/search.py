@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -41,10 +42,17 @@ def complete(problem: ArticulatedProblem, found: ArticulatedFit, settings: Judge
     return bool(quiet(found, settings).all() and not far.any())
 
 
+_NOMINAL: WeakKeyDictionary[ArticulatedProblem, ArticulatedFit] = WeakKeyDictionary()
+"""Fits of the nominal model, kept for as long as their problem: its steps, its noise and the search all ask for one."""
+
+
 def nominal_fit(problem: ArticulatedProblem) -> ArticulatedFit:
     """The nominal model alone, with the scales of the joints that it leaves."""
-    vector = roughly(problem)
-    return refitted(problem, (), vector, scale=ArticulatedFit.at(problem, (), vector).scale)
+    if problem not in _NOMINAL:
+        vector = roughly(problem)
+        scale = ArticulatedFit.at(problem, (), vector).scale
+        _NOMINAL[problem] = refitted(problem, (), vector, scale=scale)
+    return _NOMINAL[problem]
 
 
 def believable(problem: ArticulatedProblem, found: ArticulatedFit) -> ArticulatedFit:
