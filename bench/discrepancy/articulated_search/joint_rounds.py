@@ -69,8 +69,12 @@ def round_of(
         told = freed(problem, told, least)
         rounds.append(told)
         fits += told.fits
+        instead = None if told.best is None else _in_the_place(problem, current, told.best, parts, settings)
+        fits += [] if instead is None else [instead]
         best = max(
-            (f for f in (best, told.best) if f is not None), key=lambda f: f.log_posterior, default=None
+            (f for f in (best, told.best, instead) if f is not None),
+            key=lambda f: f.log_posterior,
+            default=None,
         )
     behind = _behind_a_train(problem, current, grounds, parts, candidates, settings, progress)
     if behind is not None:
@@ -124,16 +128,35 @@ def _behind_a_train(
     """
     if len(parts) < 2 or not problem.deadline.allows("an elastic drive beside what other joints miss"):
         return None
-    most, *others = sorted(parts, key=lambda part: -part.log_posterior)
+    most = max(parts, key=lambda part: part.log_posterior)
     trains = [c for c in candidates if c.effect.train and c.joint == most.hypothesis[-1].joint]
     gained, least = 2.0 * (most.log_posterior - current.log_posterior), most.log_posterior - settings.sight
     progress(f"an elastic drive at joint '{problem.joints[most.hypothesis[-1].joint].name}'")
     told = best_of(problem, current, grounds, trains, settings, lambda text: None, gained, least)
     train = freed(problem, told, least).best
-    if train is None or train.log_posterior < most.log_posterior:
+    return None if train is None else _in_the_place(problem, current, train, parts, settings)
+
+
+def _in_the_place(
+    problem: ArticulatedProblem,
+    current: ArticulatedFit,
+    found: ArticulatedFit,
+    parts: Sequence[ArticulatedFit],
+    settings: SearchSettings,
+) -> ArticulatedFit | None:
+    """A fit with an effect in the place of what its joint misses of its own, where it is likelier than that, beside what the others miss.
+
+    Where many joints miss something, one effect that reaches several of them is less than all of that, be it what its joint misses or not.
+    """
+    joint = found.hypothesis[-1].joint
+    mine = [part for part in parts if part.hypothesis[-1].joint == joint]
+    others = sorted((part for part in parts if part not in mine), key=lambda part: -part.log_posterior)
+    if not mine or not others or found.log_posterior < max(part.log_posterior for part in mine):
         return None
-    whole = _joined(problem, current, [train, *others])
-    return whole if whole.log_posterior >= train.log_posterior + settings.worth * len(others) else None
+    if not problem.deadline.allows("what reaches several joints beside what others miss"):
+        return None
+    whole = _joined(problem, current, [found, *others])
+    return whole if whole.log_posterior >= found.log_posterior + settings.worth * len(others) else None
 
 
 def _of_one_kind(
@@ -191,12 +214,13 @@ def _begun(current: ArticulatedFit, placed: PlacedOnJoint) -> tuple[JointHypothe
 def _joined(
     problem: ArticulatedProblem, current: ArticulatedFit, parts: Sequence[ArticulatedFit]
 ) -> ArticulatedFit:
-    """A fit with the last effects of several, each about a joint of its own, on top of what they have in common."""
+    """A fit with the last effects of several, each about a joint of its own but perhaps the first, on top of what they have in common."""
     vector, last = parts[0].vector[: problem.size(current.hypothesis)].copy(), list[Array]()
     for part in parts:
-        (j,) = problem.reached(part.hypothesis[-1:])
-        own = own_entries(problem, current.hypothesis, j)
-        vector[own] = part.vector[own]
+        reached = problem.reached(part.hypothesis[-1:])
+        if len(reached) == 1:  # what reaches more stands as the first, and has moved what is theirs
+            own = own_entries(problem, current.hypothesis, reached[0])
+            vector[own] = part.vector[own]
         last.append(part.vector[len(vector) :])
     hypothesis = (*current.hypothesis, *(part.hypothesis[-1] for part in parts))
     vector = np.concatenate([vector, *last])

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from bench.discrepancy.case.case import Case, CaseChannel
-from bench.discrepancy.case.channel_noise import noise_floor
+from bench.discrepancy.case.channel_noise import noise_floor, quiet_noise
 from bench.errors import FileFormatError, UnknownNameError
 
 SENSORS = {
@@ -19,7 +19,7 @@ SENSORS = {
 
 
 def bound(case: Case, model: mujoco.MjModel) -> Case:
-    """The case with every channel's target a joint or an actuator, and its noise, where it is not stated, read off the records.
+    """The case with every channel's target a joint or an actuator, and the noise of what was measured read off where it is not stated.
 
     A channel may name its joint or actuator itself, or a sensor of the model (jointpos, jointvel, actuatorfrc), by an entry or by its
     own name.
@@ -46,9 +46,12 @@ def _bound(case: Case, channel: CaseChannel, model: mujoco.MjModel) -> CaseChann
     if name not in known:
         raise UnknownNameError(f"{kind} that channel '{channel.name}' stands for", name, known)
     noise = channel.noise_std
+    logged = [np.asarray(r.values[channel.name]) for r in (*case.identification, *case.validation)]
     if noise is None and kind == "joint":
-        records = (*case.identification, *case.validation)
-        noise = max(noise_floor(np.asarray(r.values[channel.name])) for r in records)
+        noise = max(noise_floor(samples) for samples in logged)
+    elif noise is None and channel.role == "measured":
+        # a current follows contacts and reversals of friction at once, of which differences of third order know nothing
+        noise = max(min(noise_floor(samples), quiet_noise(samples)) for samples in logged)
     return replace(channel, target=f"{kind}:{name}", noise_std=noise)
 
 
