@@ -168,6 +168,7 @@ FORCES: tuple[Effect, ...] = (
         "f = Fc (1 + a sin(2 pi f t + phi)) sgn(v), set-valued at rest",
         law=TIME_VARYING_FRICTION,
         limit=limits.time_varying_limit,
+        contains=("coulomb_friction",),
         modulated=True,
         theta=lambda values, scales: np.append(values, FORCE_PRIORS.slow * scales.velocity),
     ),

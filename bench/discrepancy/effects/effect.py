@@ -201,6 +201,7 @@ class Effect:
         carried: Parameter values and scales to the inertia that its law moves instead of the nominal model's own; None where it moves
             none.
         in_place: It takes the place of the nominal model's own dry friction along its coordinate.
+        contains: Names of the plainer laws that it is for some values of its parameters.
     """
 
     name: str
@@ -232,6 +233,7 @@ class Effect:
     creeps: bool = False
     varies: str = ""
     in_place: bool = False
+    contains: tuple[str, ...] = ()
     carried: Callable[[Values, Scales], float] | None = None
     of_record: Callable[[Values, str], Values] | None = None
     schedule: Callable[[Values, CaseRecord], Values] | None = None

@@ -63,6 +63,7 @@ FRICTION_AND_HYSTERESIS: tuple[Effect, ...] = (
         law=STRIBECK,
         affine=True,
         limit=limits.stribeck_limit,
+        contains=("coulomb_friction",),
         theta=lambda values, scales: np.append(values, FORCE_PRIORS.slow * scales.velocity),
     ),
     Effect(
@@ -91,6 +92,7 @@ FRICTION_AND_HYSTERESIS: tuple[Effect, ...] = (
         "f = s0 z + s1 z', z' = v - s0 |v| z / Fc (LuGre; Dahl for s1 = 0)",
         law=LUGRE,
         theta=_lugre_theta,
+        contains=("coulomb_friction",),
         rate_bound=lambda values, scales: scales.velocity / values[1],
     ),
     Effect(

@@ -141,6 +141,7 @@ RARER: tuple[Effect, ...] = (
         law=ASYMMETRIC_GAP,
         n_linear=2,
         theta=lambda values, scales: np.append(values, 0.0),
+        contains=("gap", "one_sided_stop"),
         log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(
@@ -226,6 +227,7 @@ RARER: tuple[Effect, ...] = (
         law=BOUC_WEN_DEGRADING,
         theta=_degrading_theta,
         rate_bound=hysteretic_rate,
+        contains=("bouc_wen_hysteresis",),
         log_prior=EFFECT_SETTINGS.rare,
     ),
     Effect(
@@ -241,6 +243,7 @@ RARER: tuple[Effect, ...] = (
         law=BOUC_WEN_PINCHING,
         theta=_pinching_theta,
         rate_bound=hysteretic_rate,
+        contains=("bouc_wen_hysteresis",),
         log_prior=EFFECT_SETTINGS.rare,
     ),
 )

@@ -1,7 +1,8 @@
 """What is said where the error of the model, not noise, decides what an explanation leaves.
 
 Explanations are compared by blocks that their fits did not see (`held_out`). Among those within one standard error of the best
-the simplest and commonest is named, and they are declared a set. An effect beside others is named if it closes a material part of the
+the simplest and commonest is named, and they are declared a set; so are a law and a plainer one that it contains, where what the richer
+closes beyond it is not material. An effect beside others is named if it closes a material part of the
 discrepancy. The judging records choose nothing; they veto: what does not shrink their discrepancy is not named.
 
 References:
@@ -16,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.fitting.goodness_of_fit import complexity
+from bench.discrepancy.fitting.goodness_of_fit import complexity, key_of
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
 from bench.discrepancy.judgement.finalists import (
     as_good,
@@ -24,6 +25,7 @@ from bench.discrepancy.judgement.finalists import (
     finalists,
     held_out_as,
     nominal_moves,
+    plainer,
     without,
 )
 from bench.discrepancy.likelihood.problem import Array, Problem
@@ -128,6 +130,19 @@ def judge(
             )
             break
         vetoed = True
+    richer = list[HeldOut]()
+    plain = plainer(chosen, explanations, nothing.explanation, known)
+    if plain is not None and known.pays(
+        plain.explanation,
+        nothing.explanation,
+        part,
+        believed(nothing.explanation, plain.explanation, settings),
+    ):
+        found = [
+            plain,
+            *(e for e in found if key_of(e.explanation.hypothesis) != key_of(plain.explanation.hypothesis)),
+        ]
+        richer, alike, chosen = [chosen], (plain, *alike), plain
     weights = shares(found, _log_priors(found), rng, judgement.held_out.draws)
     if trusted and chosen is not nothing:  # more than noise is missing, and small things are in the doubts
         weights = np.where([entry is nothing for entry in found], 0.0, weights)
@@ -141,7 +156,9 @@ def judge(
     return Judged(
         chosen,
         tuple(found),
-        _undecided(weights, found, [chosen, *preferred]) if chosen.explanation.hypothesis else weights,
+        _undecided(weights, found, [chosen, *richer, *preferred])
+        if chosen.explanation.hypothesis
+        else weights,
         within,
         alike,
         vetoed,

@@ -149,6 +149,39 @@ def _accounts_for_it(explanation: Explanation, rest: Explanation, known: Discrep
     return outside(left, replace(settings.judgement.coarse, outside=0.5)) < 0.5
 
 
+def plainer(
+    entry: HeldOut, explanations: Sequence[Explanation], nothing: Explanation, known: Discrepancies
+) -> HeldOut | None:
+    """The same explanation with a plainer law that one of its laws contains, where the richer closes nothing material beyond it.
+
+    What a law may be bent to besides, the small things that every rig has, tells it from the plainer one and is no sign of it.
+
+    Args:
+        entry: What would be named.
+        explanations: All, the nominal model alone among them.
+        nothing: The nominal model, its parameters re-estimated.
+        known: What explanations leave of the records.
+    """
+    settings = entry.explanation.settings.judgement.coarse
+    asked = [e for e in explanations if contains(entry.explanation, e)]
+    for e in sorted(asked, key=lambda e: -e.log_posterior):
+        plain = bounded(e, settings.within)
+        more = known.closed(entry.explanation, plain, nothing)
+        if more < settings.material and not _accounts_for_it(entry.explanation, plain, known):
+            return held_out(plain)
+    return None
+
+
+def contains(explanation: Explanation, other: Explanation) -> bool:
+    """Whether another explanation is one with a plainer law in the place of one that contains it."""
+    own, theirs = ({p.key: p for p in e.hypothesis} for e in (explanation, other))
+    lost, gained = own.keys() - theirs.keys(), theirs.keys() - own.keys()
+    if not len(lost) == len(gained) == 1:
+        return False
+    (rich,), (plain,) = [own[key] for key in lost], [theirs[key] for key in gained]
+    return plain.effect.name in rich.effect.contains and plain.place == rich.place
+
+
 def as_good(entry: HeldOut, best: HeldOut, settings: CoarseSettings, errors: float = 1.0) -> bool:
     """Whether an explanation predicts as well as the best one: within a standard error, or what so few samples cannot tell."""
     worse, error = entry.worse_than(best)
