@@ -290,6 +290,34 @@ def test_what_accounts_for_all_that_another_effect_leaves_is_named_beside_it():
     assert named == ["gap"]
 
 
+def test_a_law_whose_further_parts_close_nothing_material_is_named_by_the_plainer_one_that_it_contains():
+    """A stop on one side over a faint cubic spring, of which a stop on the other side takes a part; and stops on both sides."""
+
+    def stopped(other_side):
+        def forces(x, v, z):
+            return 5e3 * max(x - 0.004, 0.0) + other_side * min(x + 0.004, 0.0) + 2e4 * x**3, []
+
+        case = planted_case(lambda f: motion_with(f, forces), n=1500, noise=UNSTATED)
+        problem = problem_of(case, crude_error(case, structure_of(case)))
+        near = {
+            "asymmetric_gap": (5e3, max(other_side, 200.0), 0.004, 0.004),
+            "one_sided_stop": (5e3, 0.004, 1.0),
+        }
+        names = ("asymmetric_gap",), ("one_sided_stop",), ()
+        told = judge(
+            case, problem, [explanation(problem, *n, near=near) for n in names], np.random.default_rng(0)
+        )
+        alike = {p.effect.name for entry in told.alike for p in entry.explanation.hypothesis}
+        share = told.weights[told.found.index(told.chosen)]
+        return [p.effect.name for p in told.chosen.explanation.hypothesis], alike, share
+
+    named, alike, share = stopped(0.0)
+    assert named == ["one_sided_stop"]
+    assert alike >= {"one_sided_stop", "asymmetric_gap"}
+    assert share > 0.4  # the blocks may prefer the richer law, and what that is worth is not known
+    assert stopped(2e3)[0] == ["asymmetric_gap"]
+
+
 @pytest.fixture
 def judged(monkeypatch):
     """`left` and `pays` of an explanation, from what it and the nominal model (re-estimated, as stated) leave of the judging records."""

@@ -189,5 +189,11 @@ def test_what_does_not_do_what_it_is_called_for_is_no_explanation(stiff):
     assert works(stop, position=-0.5, side=-1.0)
     assert not works(stop, position=-1.1, side=1.0)  # always touched
     names = {p.effect.name for p in along_motion(list(by_key.values()))}
-    assert {"coulomb_friction", "force_gain_error", "mass_error"} <= names
-    assert not names & {"actuator_deadband", "actuator_saturation", "backlash", "joint_compliance"}
+    assert {"coulomb_friction", "force_gain_error", "mass_error", "actuator_delay"} <= names
+    assert not names & {
+        "actuator_deadband",
+        "actuator_lag",
+        "actuator_saturation",
+        "backlash",
+        "joint_compliance",
+    }

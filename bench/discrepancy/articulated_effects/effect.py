@@ -124,6 +124,11 @@ class ArticulatedEffect:
         return self.slots is train
 
     @property
+    def weakens(self) -> bool:
+        """Whether it takes away of what its drive gives: neither a wrong number nor an input that acts late."""
+        return self.site == "actuator" and not self.number and self.parameters[0].name != "delay_s"
+
+    @property
     def play(self) -> bool:
         """Whether motor and link part and meet again."""
         return any(p.name == "half_clearance" for p in self.parameters)

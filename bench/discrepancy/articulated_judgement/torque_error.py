@@ -171,5 +171,6 @@ class TorqueProblem(ArticulatedProblem):
 
 
 def along_motion(candidates: Sequence[PlacedOnJoint]) -> list[PlacedOnJoint]:
-    """Candidates that a missing torque can tell of: forces and numbers, not what takes torque away from its drive, nor elastic drives."""
-    return [c for c in candidates if not c.effect.train and (c.effect.site != "actuator" or c.effect.number)]
+    """Candidates that a missing torque can tell of: forces, numbers and inputs that act late; not what takes torque away from its drive,
+    nor elastic drives."""
+    return [c for c in candidates if not (c.effect.train or c.effect.weakens)]

@@ -68,18 +68,12 @@ def round_of(
         )
         told = freed(problem, told, least)
         rounds.append(told)
-        fits += told.fits
-        instead = None if told.best is None else _in_the_place(problem, current, told.best, parts, settings)
-        fits += [] if instead is None else [instead]
-        best = max(
-            (f for f in (best, told.best, instead) if f is not None),
-            key=lambda f: f.log_posterior,
-            default=None,
-        )
+        instead = _in_the_place(problem, current, told.best, parts, settings)
+        fits += told.fits if instead is None else [*told.fits, instead]
+        best = _likelier(best, told.best, instead)
     behind = _behind_a_train(problem, current, grounds, parts, candidates, settings, progress)
-    if behind is not None:
-        fits.append(behind)
-        best = behind if best is None else max(best, behind, key=lambda f: f.log_posterior)
+    fits += [] if behind is None else [behind]
+    best = _likelier(best, behind)
     kinds = list(_of_one_kind(problem, current, fits, own, settings, progress))
     fits += [alike for alike, _ in kinds if alike not in fits]
     if kinds:
@@ -89,6 +83,11 @@ def round_of(
     heard = [told.corrected for told in rounds if told.corrected is not None]
     corrected = max(heard, key=lambda one: one.best.log_posterior, default=None)
     return Round(best, fits, corrected)
+
+
+def _likelier(*fits: ArticulatedFit | None) -> ArticulatedFit | None:
+    """The likeliest of some fits, of which there need not be any."""
+    return max((f for f in fits if f is not None), key=lambda f: f.log_posterior, default=None)
 
 
 def _likeliest(
@@ -134,13 +133,13 @@ def _behind_a_train(
     progress(f"an elastic drive at joint '{problem.joints[most.hypothesis[-1].joint].name}'")
     told = best_of(problem, current, grounds, trains, settings, lambda text: None, gained, least)
     train = freed(problem, told, least).best
-    return None if train is None else _in_the_place(problem, current, train, parts, settings)
+    return _in_the_place(problem, current, train, parts, settings)
 
 
 def _in_the_place(
     problem: ArticulatedProblem,
     current: ArticulatedFit,
-    found: ArticulatedFit,
+    found: ArticulatedFit | None,
     parts: Sequence[ArticulatedFit],
     settings: SearchSettings,
 ) -> ArticulatedFit | None:
@@ -148,6 +147,8 @@ def _in_the_place(
 
     Where many joints miss something, one effect that reaches several of them is less than all of that, be it what its joint misses or not.
     """
+    if found is None:
+        return None
     joint = found.hypothesis[-1].joint
     mine = [part for part in parts if part.hypothesis[-1].joint == joint]
     others = sorted((part for part in parts if part not in mine), key=lambda part: -part.log_posterior)

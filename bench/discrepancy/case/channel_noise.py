@@ -10,6 +10,7 @@ References:
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +57,17 @@ def quiet_noise(x: Array) -> float:
     if len(x) < 8:
         return float("inf")
     return float(np.median(np.abs(np.diff(x, 3))) / (0.6745 * np.sqrt(20.0)))
+
+
+def noise_of_logs(logs: Iterable[Array], *, jumps: bool) -> float:
+    """White noise of a channel whose noise is not stated, the largest that any of its logs shows.
+
+    Args:
+        logs: Samples (n,) of every record.
+        jumps: Whether what is logged follows contacts and reversals of friction at once, as a current does: what their jumps leave at all
+            frequencies is no noise (`quiet_noise`).
+    """
+    return max(min(noise_floor(x), quiet_noise(x)) if jumps else noise_floor(x) for x in logs)
 
 
 def quantisation_step(samples: NDArray[np.float64], *, settings: CaseSettings = DEFAULT.case) -> float:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.discrepancy.case.case import Case
-from bench.discrepancy.fitting.goodness_of_fit import complexity, key_of
+from bench.discrepancy.fitting.goodness_of_fit import complexity
 from bench.discrepancy.judgement.doubt import like_small_things, outside, stands_outside
 from bench.discrepancy.judgement.finalists import (
     as_good,
@@ -26,6 +26,7 @@ from bench.discrepancy.judgement.finalists import (
     held_out_as,
     nominal_moves,
     plainer,
+    same,
     without,
 )
 from bench.discrepancy.likelihood.problem import Array, Problem
@@ -115,12 +116,14 @@ def judge(
     within = alike = tuple(entry for entry in found if as_good(entry, base, settings))
     part = settings.most if trusted else settings.pays
     chosen, vetoed = nothing, False
+
+    def pays(e: Explanation) -> bool:
+        alone = believed(nothing.explanation, e, settings)
+        return known.pays(e, nothing.explanation, part, alone)
+
     for own in sorted(within, key=_plainness):
         entry = _borne_out(_steady(own, case, rng), found, known)
-        alone = believed(nothing.explanation, entry.explanation, settings)
-        if not entry.explanation.hypothesis or known.pays(
-            entry.explanation, nothing.explanation, part, alone
-        ):
+        if not entry.explanation.hypothesis or pays(entry.explanation):
             found, chosen = _with(entry, own, found), entry
             alike = tuple(
                 other
@@ -130,25 +133,18 @@ def judge(
             )
             break
         vetoed = True
-    richer = list[HeldOut]()
-    plain = plainer(chosen, explanations, nothing.explanation, known)
-    if plain is not None and known.pays(
-        plain.explanation,
-        nothing.explanation,
-        part,
-        believed(nothing.explanation, plain.explanation, settings),
-    ):
-        found = [
-            plain,
-            *(e for e in found if key_of(e.explanation.hypothesis) != key_of(plain.explanation.hypothesis)),
-        ]
-        richer, alike, chosen = [chosen], (plain, *alike), plain
+    plain = plainer(chosen, explanations, nothing.explanation, known, pays)
+    richer = [] if plain is None else [chosen]
+    if plain is not None:
+        found = [plain, *(e for e in found if not same(e.explanation, plain.explanation))]
+        alike, chosen = (plain, *alike), plain
     weights = shares(found, _log_priors(found), rng, judgement.held_out.draws)
     if trusted and chosen is not nothing:  # more than noise is missing, and small things are in the doubts
         weights = np.where([entry is nothing for entry in found], 0.0, weights)
         weights = weights / weights.sum()
-    # a nominal model is as right as a model can be within two standard deviations of what sensors are calibrated to
-    error = problem.settings.likelihood.error
+    error = (
+        problem.settings.likelihood.error
+    )  # twice what sensors are calibrated to is as right as a model can be
     off = float(np.max(known.of(nothing.explanation, judging=True))) > 2.0 * error.least
     wrong = stands_outside(known.beyond_noise(nothing.explanation), settings, error)
     missing = chosen is nothing and not problem.noise_stated and off and (vetoed or wrong)

@@ -150,7 +150,11 @@ def _accounts_for_it(explanation: Explanation, rest: Explanation, known: Discrep
 
 
 def plainer(
-    entry: HeldOut, explanations: Sequence[Explanation], nothing: Explanation, known: Discrepancies
+    entry: HeldOut,
+    explanations: Sequence[Explanation],
+    nothing: Explanation,
+    known: Discrepancies,
+    pays: Callable[[Explanation], bool],
 ) -> HeldOut | None:
     """The same explanation with a plainer law that one of its laws contains, where the richer closes nothing material beyond it.
 
@@ -161,15 +165,23 @@ def plainer(
         explanations: All, the nominal model alone among them.
         nothing: The nominal model, its parameters re-estimated.
         known: What explanations leave of the records.
+        pays: Whether an explanation shrinks the judging records' discrepancy as a name has to.
     """
     settings = entry.explanation.settings.judgement.coarse
     asked = [e for e in explanations if contains(entry.explanation, e)]
     for e in sorted(asked, key=lambda e: -e.log_posterior):
         plain = bounded(e, settings.within)
         more = known.closed(entry.explanation, plain, nothing)
-        if more < settings.material and not _accounts_for_it(entry.explanation, plain, known):
+        if more >= settings.material or _accounts_for_it(entry.explanation, plain, known):
+            continue
+        if pays(plain):
             return held_out(plain)
     return None
+
+
+def same(explanation: Explanation, other: Explanation) -> bool:
+    """Whether two explanations have the same effects at the same places."""
+    return key_of(explanation.hypothesis) == key_of(other.hypothesis)
 
 
 def contains(explanation: Explanation, other: Explanation) -> bool:

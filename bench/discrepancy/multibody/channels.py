@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from bench.discrepancy.case.case import Case, CaseChannel
-from bench.discrepancy.case.channel_noise import noise_floor, quiet_noise
+from bench.discrepancy.case.channel_noise import noise_of_logs
 from bench.errors import FileFormatError, UnknownNameError
 
 SENSORS = {
@@ -45,13 +45,10 @@ def _bound(case: Case, channel: CaseChannel, model: mujoco.MjModel) -> CaseChann
     known = {"joint": joints, "actuator": actuators, "sensor": list(sensors)}[kind]
     if name not in known:
         raise UnknownNameError(f"{kind} that channel '{channel.name}' stands for", name, known)
-    noise = channel.noise_std
-    logged = [np.asarray(r.values[channel.name]) for r in (*case.identification, *case.validation)]
-    if noise is None and kind == "joint":
-        noise = max(noise_floor(samples) for samples in logged)
-    elif noise is None and channel.role == "measured":
-        # a current follows contacts and reversals of friction at once, of which differences of third order know nothing
-        noise = max(min(noise_floor(samples), quiet_noise(samples)) for samples in logged)
+    noise, measured = channel.noise_std, kind == "joint" or channel.role == "measured"
+    if noise is None and measured:
+        logged = (np.asarray(r.values[channel.name]) for r in (*case.identification, *case.validation))
+        noise = noise_of_logs(logged, jumps=kind == "actuator")
     return replace(channel, target=f"{kind}:{name}", noise_std=noise)
 
 
