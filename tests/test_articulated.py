@@ -253,6 +253,19 @@ def test_a_base_that_leans_is_named_by_its_angles_and_gravity_turned_in_the_mode
     assert corrected.compiled().opt.gravity == pytest.approx(pull, abs=0.06)
 
 
+def test_a_measured_torque_whose_noise_nobody_stated_has_the_noise_of_its_log(tmp_path):
+    folder = write_case(tmp_path, mjcf(servo=False), servo=False, torque_noise=0.02)
+    stated = json.loads((folder / "nominal.json").read_text())
+    for joint in KP:
+        stated["channels"][f"{joint}_in"] |= {"role": "measured", "noise_std": None}
+    stated["channels"]["elbow_in"]["role"] = "command"
+    (folder / "nominal.json").write_text(json.dumps(stated))
+    case = read_case(folder)
+    known = {c.name: c.noise_std for c in bound(case, compiled_model(folder / "model.xml")).channels}
+    assert known["shoulder_in"] == pytest.approx(0.02, rel=0.2)
+    assert known["elbow_in"] is None  # what was asked for is what it is
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_torques_that_were_held_are_read_so_where_nobody_says_and_no_delay_is_named(tmp_path, noise):

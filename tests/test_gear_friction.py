@@ -16,8 +16,8 @@ from bench.discrepancy.articulated_judgement.judgement import Judge
 from bench.discrepancy.articulated_search.containing import begun_again
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit, refitted
 from bench.discrepancy.articulated_search.placements import placements
-from bench.discrepancy.articulated_search.rounds import sound
 from bench.discrepancy.articulated_search.search import believable, nominal_fit
+from bench.discrepancy.articulated_search.soundness import sound
 from bench.discrepancy.multibody.joint_forces import SLOTS, Slot
 from bench.discrepancy.multibody.joint_torque import missing_torque
 

@@ -21,7 +21,7 @@ from bench.discrepancy.articulated_judgement.predicted_errors import predict
 from bench.discrepancy.articulated_judgement.torque_error import TorqueProblem, along_motion
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
 from bench.discrepancy.articulated_search.placements import placements
-from bench.discrepancy.articulated_search.rounds import sound
+from bench.discrepancy.articulated_search.soundness import sound
 from bench.discrepancy.multibody.joint_forces import SLOTS, Slot
 from bench.discrepancy.multibody.joint_torque import missing_torque
 from bench.discrepancy.replay.verification import verify
@@ -197,3 +197,20 @@ def test_what_does_not_do_what_it_is_called_for_is_no_explanation(stiff):
         "backlash",
         "joint_compliance",
     }
+
+
+def test_a_damping_that_drives_its_joint_is_no_damping(stiff):
+    problem = problem_of(stiff)
+    wrong = next(p for p in placements(problem, CATALOGUE) if p.key == ("damping_error", "elbow"))
+    unit = wrong.effect.parameters[0].value(1.0, wrong.scales)
+
+    def stands(total, std):
+        eta = np.array([(total - STATED) / unit])
+        found = ArticulatedFit.at(problem, (wrong,), np.append(np.zeros(len(problem.nominal)), eta))
+        known = found.covariance.copy()
+        known[-1, -1] = (std / unit) ** 2
+        return sound(problem, replace(found, covariance=known, log_posterior=0.0))
+
+    assert stands(0.5 * STATED, 0.01 * STATED)
+    assert stands(-0.02 * STATED, 0.02 * STATED)  # none, as well as it is known
+    assert not stands(-STATED, 0.02 * STATED)

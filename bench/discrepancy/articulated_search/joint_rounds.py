@@ -17,9 +17,9 @@ from bench.discrepancy.articulated_search.rounds import (
     freed,
     grounds_of,
     quiet,
-    sound,
     strained,
 )
+from bench.discrepancy.articulated_search.soundness import sound
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
 
 
@@ -143,16 +143,18 @@ def _in_the_place(
     parts: Sequence[ArticulatedFit],
     settings: SearchSettings,
 ) -> ArticulatedFit | None:
-    """A fit with an effect in the place of what its joint misses of its own, where it is likelier than that, beside what the others miss.
+    """A fit with an effect in the place of what its joints miss of their own, where it is likelier than that, beside what others miss.
 
     Where many joints miss something, one effect that reaches several of them is less than all of that, be it what its joint misses or not.
     """
     if found is None:
         return None
-    joint = found.hypothesis[-1].joint
-    mine = [part for part in parts if part.hypothesis[-1].joint == joint]
+    placed = found.hypothesis[-1]
+    sits = placed.joints if placed.effect.site == "joint" else (placed.joint,)
+    mine = [part for part in parts if part.hypothesis[-1].joint in sits]
     others = sorted((part for part in parts if part not in mine), key=lambda part: -part.log_posterior)
-    if not mine or not others or found.log_posterior < max(part.log_posterior for part in mine):
+    gained = sum(part.log_posterior - current.log_posterior for part in mine)
+    if not mine or not others or found.log_posterior < current.log_posterior + gained:
         return None
     if not problem.deadline.allows("what reaches several joints beside what others miss"):
         return None

@@ -20,6 +20,7 @@ from bench.discrepancy.articulated_search.fitting import ArticulatedFit, Others,
 from bench.discrepancy.articulated_search.periods import beside
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.articulated_search.screening import Screened, by_effect, screen
+from bench.discrepancy.articulated_search.soundness import sound
 from bench.discrepancy.numerics.threads import in_threads
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
@@ -240,29 +241,6 @@ def _again(
     return refitted(
         problem, found.hypothesis, np.vstack([vector, *starts]), scale=scale, others=others, least=least
     )
-
-
-def sound(problem: ArticulatedProblem, found: ArticulatedFit) -> bool:
-    """Whether a fit is finite, no parameter of its effects sits at a bound, and its effects do what they are called for."""
-    settings = problem.settings.articulated
-    if not (np.isfinite(found.log_posterior) and np.isfinite(found.vector).all()):
-        return False
-    etas = problem.etas(found.hypothesis, found.vector)
-    if not all(p.effect.works(eta, p.scales) for p, eta in zip(found.hypothesis, etas, strict=True)):
-        return False
-    at = len(problem.nominal)
-    for placed in found.hypothesis:
-        for p in placed.effect.parameters:
-            low, high = p.bounds
-            inside = low + settings.at_bound < found.vector[at] < high - settings.at_bound
-            if not (inside or p.fixed or p.name in BOUNDED):
-                return False
-            at += 1
-    return True
-
-
-BOUNDED = ("motor_share", "position")
-"""Parameters whose bounds are physical: a share is at most one, a stop lies where the joint goes."""
 
 
 def scale_of(problem: ArticulatedProblem, found: ArticulatedFit) -> Array:

@@ -27,10 +27,10 @@ from bench.discrepancy.articulated_search.rounds import (
     grounds_of,
     parted,
     quiet,
-    sound,
     strained,
 )
 from bench.discrepancy.articulated_search.screening import by_effect, screen
+from bench.discrepancy.articulated_search.soundness import sound
 from bench.discrepancy.multibody.nominal_parameters import twins
 from bench.discrepancy.settings import ArticulatedJudgementSettings as JudgementSettings
 from bench.discrepancy.settings import ArticulatedSearchSettings as SearchSettings
