@@ -30,6 +30,11 @@ MADE = {
         GRADED.format("fifth_", "fifth-laboratory"),
         "python scripts/fifth_laboratory.py out/fifth-laboratory",
     ),
+    "sixth_laboratory": (
+        "Cases of a sixth author, who knew nothing of the diagnosis: isolators, frames, a stage, a rotor, dampers",
+        GRADED.format("sixth_", "sixth-laboratory"),
+        "python scripts/sixth_laboratory.py out/sixth-laboratory",
+    ),
     "second_robots": (
         "Cases of a second author, who knew nothing of the diagnosis: robots",
         GRADED.format("ptz vee scar hop dsk gan", "second-robots/cases"),
@@ -49,6 +54,11 @@ MADE = {
         "Cases of a fifth author, who knew nothing of the diagnosis: robots",
         GRADED.format("fifth_", "fifth-robots/cases"),
         "python scripts/fifth_robots.py out/fifth-robots/cases out/fifth-robots/answers",
+    ),
+    "sixth_robots": (
+        "Cases of a sixth author, who knew nothing of the diagnosis: robots",
+        GRADED.format("sixth_", "sixth-robots/cases"),
+        "python scripts/sixth_robots.py out/sixth-robots/cases out/sixth-robots/answers",
     ),
 }
 """By name: title of the capability, its command, and the command that makes its cases."""

@@ -143,18 +143,17 @@ def _in_the_place(
     parts: Sequence[ArticulatedFit],
     settings: SearchSettings,
 ) -> ArticulatedFit | None:
-    """A fit with an effect in the place of what its joints miss of their own, where it is likelier than that, beside what others miss.
+    """A fit with an effect in the place of what its joint misses of its own, where it is likelier than that, beside what others miss.
 
     Where many joints miss something, one effect that reaches several of them is less than all of that, be it what its joint misses or not.
+    A drive that joints share is rarer than what each of them misses, and has to be likelier than all of that by itself.
     """
-    if found is None:
+    if found is None or len(found.hypothesis[-1].joints) > 1:
         return None
-    placed = found.hypothesis[-1]
-    sits = placed.joints if placed.effect.site == "joint" else (placed.joint,)
-    mine = [part for part in parts if part.hypothesis[-1].joint in sits]
+    joint = found.hypothesis[-1].joint
+    mine = [part for part in parts if part.hypothesis[-1].joint == joint]
     others = sorted((part for part in parts if part not in mine), key=lambda part: -part.log_posterior)
-    gained = sum(part.log_posterior - current.log_posterior for part in mine)
-    if not mine or not others or found.log_posterior < current.log_posterior + gained:
+    if not mine or not others or found.log_posterior < max(part.log_posterior for part in mine):
         return None
     if not problem.deadline.allows("what reaches several joints beside what others miss"):
         return None
