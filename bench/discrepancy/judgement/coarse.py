@@ -142,11 +142,7 @@ def judge(
     if trusted and chosen is not nothing:  # more than noise is missing, and small things are in the doubts
         weights = np.where([entry is nothing for entry in found], 0.0, weights)
         weights = weights / weights.sum()
-    error = (
-        problem.settings.likelihood.error
-    )  # twice what sensors are calibrated to is as right as a model can be
-    off = float(np.max(known.of(nothing.explanation, judging=True))) > 2.0 * error.least
-    wrong = stands_outside(known.beyond_noise(nothing.explanation), settings, error)
+    off, wrong = _off(problem, nothing.explanation, known)
     missing = chosen is nothing and not problem.noise_stated and off and (vetoed or wrong)
     preferred = [other for other in found if known.prefers(other.explanation, chosen.explanation)]
     return Judged(
@@ -164,6 +160,16 @@ def judge(
         settings,
         known,
     )
+
+
+def _off(problem: Problem, nothing: Explanation, known: Discrepancies) -> tuple[bool, bool]:
+    """Whether the nominal model, its parameters re-estimated, is off by more than sensors are calibrated to, and by more than models are.
+
+    A nominal model is as right as a model can be within two standard deviations of what sensors are calibrated to.
+    """
+    settings, error = problem.settings.judgement.coarse, problem.settings.likelihood.error
+    off = float(np.max(known.of(nothing, judging=True))) > 2.0 * error.least
+    return off, stands_outside(known.beyond_noise(nothing), settings, error)
 
 
 def _doubts(chosen: Explanation, nothing: Explanation, known: Discrepancies) -> dict[tuple[str, str], float]:
