@@ -108,8 +108,7 @@ def judge(
         trusted: Whether the noise is stated, and nothing contradicts it: what is named has to close most of the discrepancy then.
     """
     judgement = problem.settings.judgement
-    likeliest = explanations[0].hypothesis
-    read = {placed.target for placed in likeliest if placed.effect.added is not None}
+    read = {placed.target for placed in explanations[0].hypothesis if placed.effect.added is not None}
     settings, known = judgement.coarse, Discrepancies(case, problem, read)
     found = finalists(explanations, known, settings)
     base, nothing = found[0], next(e for e in found if not e.explanation.hypothesis)
@@ -144,13 +143,13 @@ def judge(
         weights = weights / weights.sum()
     off, wrong = _off(problem, nothing.explanation, known)
     missing = chosen is nothing and not problem.noise_stated and off and (vetoed or wrong)
-    preferred = [other for other in found if known.prefers(other.explanation, chosen.explanation)]
+    if chosen.explanation.hypothesis:
+        preferred = [other for other in found if known.prefers(other.explanation, chosen.explanation)]
+        weights = _undecided(weights, found, [chosen, *richer, *preferred])
     return Judged(
         chosen,
         tuple(found),
-        _undecided(weights, found, [chosen, *richer, *preferred])
-        if chosen.explanation.hypothesis
-        else weights,
+        weights,
         within,
         alike,
         vetoed,
