@@ -55,5 +55,10 @@ MADE = {
         GRADED.format("fifth_", "fifth-robots/cases"),
         "python scripts/fifth_robots.py out/fifth-robots/cases out/fifth-robots/answers",
     ),
+    "sixth_robots": (
+        "Cases of a sixth author, who knew nothing of the diagnosis: robots",
+        GRADED.format("sixth_", "sixth-robots/cases"),
+        "python scripts/sixth_robots.py out/sixth-robots/cases out/sixth-robots/answers",
+    ),
 }
 """By name: title of the capability, its command, and the command that makes its cases."""
