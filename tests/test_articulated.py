@@ -33,6 +33,7 @@ from bench.discrepancy.articulated_search.search import complete, without_idle
 from bench.discrepancy.multibody.body_numbers import BodyNumbers
 from bench.discrepancy.multibody.channels import bound
 from bench.discrepancy.multibody.encoders import Encoder, weight_of_readings
+from bench.discrepancy.multibody.joint_forces import SLOTS
 from bench.discrepancy.multibody.model import ArticulatedModel, compiled_model
 from bench.discrepancy.multibody.records import corrected, settled
 from bench.discrepancy.precheck.checking import check
@@ -469,11 +470,12 @@ def test_equations_hold_where_a_link_is_and_its_gear_carries_what_the_bodies_wei
     )  # not the ends, where the filter of the angle rings
     for j, record in enumerate(found.joints):
         bias, inertia = record.coefficients(numbers)
+        grows = np.ones(SLOTS)
         wanted = np.abs(CubicSpline(t, np.array(torques)[:, j])(middles))[inner]
         size = np.sqrt(np.mean(wanted**2))
-        np.testing.assert_allclose(record.load(bias, inertia)[inner], wanted, atol=0.01 * size)
+        np.testing.assert_allclose(record.load(bias, inertia, grows)[inner], wanted, atol=0.01 * size)
         stated, alone = record.coefficients(BodyNumbers({}))
-        assert np.sqrt(np.mean((record.load(stated, alone)[inner] - wanted) ** 2)) > 0.1 * size
+        assert np.sqrt(np.mean((record.load(stated, alone, grows)[inner] - wanted) ** 2)) > 0.1 * size
 
 
 def test_behind_a_wrong_encoder_bodies_weigh_what_they_do_in_the_true_posture(tmp_path):

@@ -130,7 +130,7 @@ class TorqueProblem(ArticulatedProblem):
         bias, inertia = self.coefficients(record, hypothesis, vector)
         motion, still = self.moved(prepared)[j], self.levels[r].speed[j]
         torque = missing_torque(
-            p, (inertia, bias, record.load(bias, inertia)), record.servo_command, record.step, motion, still,
+            p, (inertia, bias, record.load(bias, inertia, p)), record.servo_command, record.step, motion, still,
             self.beside(j, hypothesis, record), self.touch(j, hypothesis, record),
         )  # fmt: skip
         return self.means(r, torque) / part

@@ -11,10 +11,12 @@ References:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from bench.arrays import Array
@@ -32,9 +34,24 @@ def whitened(original: JointRecord, record: JointRecord, out: Array, diverged: f
         diverged: What stands for those that are not finite.
     """
     # a corrected log has another noise; residuals are compared in units of what was logged
-    innovation = out[:, : record.n_measured] * (original.noise / record.noise)
-    found = innovation @ original.whitening.T * original.weight
-    return np.nan_to_num(found, nan=diverged, posinf=diverged, neginf=-diverged)
+    ratio = original.noise / record.noise
+    return np.asarray(_whitened(out, original.whitening * ratio, original.weight, diverged))
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _whitened(out: Array, whitening: Array, weight: Array, diverged: float) -> Array:
+    """Innovations (n, 2 or less read) times a triangular whitening (k, k) and weights (n, k)."""
+    found = np.empty(weight.shape)
+    for i in range(weight.shape[0]):
+        for k in range(weight.shape[1]):
+            total = 0.0
+            for m in range(k + 1):
+                total += whitening[k, m] * out[i, m]
+            total *= weight[i, k]
+            if not math.isfinite(total):
+                total = diverged if math.isnan(total) else math.copysign(diverged, total)
+            found[i, k] = total
+    return found
 
 
 def softened(prepared: PreparedRecord, level: float) -> PreparedRecord:

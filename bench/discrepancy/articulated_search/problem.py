@@ -229,7 +229,7 @@ class ArticulatedProblem:
         p = self.slots(j, hypothesis, vector, on_link=record.on_link) if p is None else p.copy()
         p[Slot.RATIO] *= record.servo_ratio
         return predict(
-            p, (inertia, bias, record.slope, record.reference, record.load(bias, inertia)), record.servo_command, record.step,
+            p, (inertia, bias, record.slope, record.reference, record.load(bias, inertia, p)), record.servo_command, record.step,
             record.n_sub, (record.position, record.velocity), gain, starts, every, self.beside(j, hypothesis, record),
             self.touch(j, hypothesis, record),
         )  # fmt: skip

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,40 +43,35 @@ class BodyTerms:
     Attributes:
         mass: Its mass [kg].
         axes: Uncertain coordinates of its centre of mass.
-        point: (…, 2, n_steps) P(c), bias and inertia by a kilogram at its centre of mass.
-        slopes: (n_axes, …, 2, n_steps) G.
-        curvatures: (n_axes, n_axes, …, 2, n_steps) H.
-        moment: (…, 2, n_steps) R, by a unit of its moment of inertia; zeros where that is certain.
+        terms: (2 + n_axes + n_axes^2, …, 2, n_steps) changes of bias and inertia: P(c), by a kilogram at its centre of mass, R, by a unit
+            of its moment of inertia (zeros where that is certain), G and H.
         felt: (n_joints,), or of one joint: whether anything of it is more there than rounding, beside the joint that feels it most.
     """
 
     mass: float
     axes: tuple[str, ...]
-    point: Array
-    slopes: Array
-    curvatures: Array
-    moment: Array
+    terms: Array
     felt: NDArray[np.bool_]
 
     def of_joint(self, j: int) -> BodyTerms:
         """The terms of joint `j`."""
-        return replace(
-            self, point=self.point[j], slopes=self.slopes[:, j], curvatures=self.curvatures[:, :, j], moment=self.moment[j],
-            felt=self.felt[j],
-        )  # fmt: skip
+        return replace(self, terms=np.ascontiguousarray(self.terms[:, j]), felt=self.felt[j])
 
-    def change(self, by: Mapping[str, float]) -> Array:
-        """Changes (2, n_steps) of bias and inertia with the numbers changed by `by`, a kind of `BODIES` to its change."""
-        shift = np.array([by.get(axis, 0.0) for axis in self.axes])
-        out = by.get("mass", 0.0) * self.point
-        if shift.any():
-            moved = np.tensordot(
-                shift, self.slopes + 0.5 * np.tensordot(shift, self.curvatures, axes=1), axes=1
-            )
-            out = out + (self.mass + by.get("mass", 0.0)) * moved
-        if by.get("inertia"):
-            out = out + by["inertia"] * self.moment
-        return out
+    def change(self, coefficients: Array, by: Mapping[str, float]) -> None:
+        """Change bias and inertia (2, n_steps), in place, by the numbers changed by `by`, a kind of `BODIES` to its change."""
+        shift, more = np.array([by.get(axis, 0.0) for axis in self.axes]), by.get("mass", 0.0)
+        moved = (self.mass + more) * np.concatenate([shift, 0.5 * np.outer(shift, shift).ravel()])
+        add_multiples(coefficients, np.concatenate([[more, by.get("inertia", 0.0)], moved]), self.terms)
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def add_multiples(out: Array, factors: Array, terms: Array) -> None:
+    """Add multiples by factors (k,) of terms (k, 2, n) to `out` (2, n)."""
+    for k in range(len(factors)):
+        if factors[k] != 0.0:
+            for i in range(out.shape[0]):
+                for j in range(out.shape[1]):
+                    out[i, j] += factors[k] * terms[k, i, j]
 
 
 class GravityTerms(NamedTuple):
@@ -145,9 +141,9 @@ def _terms(
 
     here = point(np.zeros(3))
     ahead, behind = [point(step) for step in steps], [point(-step) for step in steps]
-    slopes, curvatures = np.zeros((len(axes), *here.shape)), np.zeros((len(axes), len(axes), *here.shape))
+    slopes, curvatures = [], np.zeros((len(axes), len(axes), *here.shape))
     for i, axis in enumerate(axes):
-        slopes[i] = (ahead[i] - behind[i]) / (2.0 * std[axis])
+        slopes.append((ahead[i] - behind[i]) / (2.0 * std[axis]))
         curvatures[i, i] = (ahead[i] + behind[i] - 2.0 * here) / std[axis] ** 2
         for k, other in enumerate(axes[:i]):
             both = point(steps[i] + steps[k]) - ahead[i] - ahead[k] + here
@@ -156,7 +152,9 @@ def _terms(
     if "inertia" in std:
         more = model.with_body("inertia", body, model.body_value("inertia", body) + std["inertia"])
         moment = beside(more.dynamics(*motion)) / std["inertia"]
-    parts = [here, *slopes, *(row for block in curvatures for row in block), moment]
-    largest = [np.abs(part).max(axis=(1, 2)) for part in parts]
-    felt = np.any([size > SETTINGS.rounding * max(float(size.max()), 1e-300) for size in largest], axis=0)
-    return BodyTerms(model.mass(body), axes, here, slopes, curvatures, moment, felt)
+    terms = np.stack([here, moment, *slopes, *(row for block in curvatures for row in block)])
+    largest = np.abs(terms).max(axis=(2, 3))
+    felt = np.any(
+        largest > SETTINGS.rounding * np.maximum(largest.max(axis=1, keepdims=True), 1e-300), axis=0
+    )
+    return BodyTerms(model.mass(body), axes, terms, felt)

@@ -13,8 +13,10 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
+from typing import Any
 
 import numba
+from numba.np.unsafe.ndarray import to_fixed_tuple
 
 
 class Slot(IntEnum):
@@ -74,6 +76,8 @@ class Slot(IntEnum):
 
 SLOTS = len(Slot)
 
+entries: Any = to_fixed_tuple
+"""Entries of an array as a tuple: for all that the compiler knows, an array is written to in a loop, and it is read anew at every step."""
 
 inlined = numba.njit(cache=True, error_model="numpy", nogil=True, inline="always")
 

@@ -19,6 +19,7 @@ from bench.arrays import Array
 from bench.discrepancy.multibody.body_numbers import BodyNumbers
 from bench.discrepancy.multibody.body_terms import BodyTerms, GravityTerms
 from bench.discrepancy.multibody.encoders import TRUE, Encoder
+from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.joints import Joint
 
 
@@ -152,24 +153,23 @@ class JointRecord:
             if key in self._made:
                 self._made.move_to_end(key)
                 return self._made[key]
-        bias, inertia = self.bias, self.inertia
+        made = np.stack([self.bias, self.inertia])
         for body, by in changed.items():
-            change = self.bodies[body].change(by)
-            bias, inertia = bias + change[0], inertia + change[1]
+            self.bodies[body].change(made, by)
         for body, values in missing:
-            change = self._left_out(body, values)
-            bias, inertia = bias + change[0], inertia + change[1]
-        found = bias, np.maximum(inertia, JOINT_RECORD_SETTINGS.lightest * self.inertia)
+            made += self._left_out(body, values)
+        found = made[0], np.maximum(made[1], JOINT_RECORD_SETTINGS.lightest * self.inertia)
         with self._making:
             self._made[key] = found
             while len(self._made) > JOINT_RECORD_SETTINGS.kept:
                 self._made.popitem(last=False)
         return found
 
-    def load(self, bias: Array, inertia: Array) -> Array:
+    def load(self, bias: Array, inertia: Array, p: Array) -> Array:
         """Magnitude (n_steps,) of the torque that the gear carries along the measured motion, for bias and inertia as of `coefficients`:
-        what moves the link and holds it, the inertia of its own motor not counted."""
-        return np.abs(bias + (inertia - self.joint.armature) * self.acceleration)
+        what moves the link and holds it, the inertia of its own motor not counted; anything where no friction of `p` grows with it."""
+        carried = p[Slot.CARRIED] != 0.0
+        return np.abs(bias + (inertia - self.joint.armature) * self.acceleration) if carried else bias
 
     def _left_out(self, body: str, values: Mapping[str, float]) -> Array:
         """Changes of bias and inertia (2, n_steps) by what the model leaves out at a body, or at the base."""

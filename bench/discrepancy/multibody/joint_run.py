@@ -28,12 +28,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.multibody.joint_forces import (
+    SLOTS,
     actuator_force,
     beyond_band,
     bristle_force_of,
     bristles_slid,
     cogging_force,
     delayed_input,
+    entries,
     friction_limit,
     inlined,
     pair_friction,
@@ -127,7 +129,7 @@ def run(
         out: (n, 2) innovations; overwritten.
         states: (n, 4) predicted position and velocity of the motor, then of the link, which are the same without a train; overwritten.
     """
-    n = y.shape[0]
+    n, p = y.shape[0], entries(p, SLOTS)
     train = p[29] > 0.5
     on_link, alone = train and p[34] > 0.5, p[40] == 0.0 and p[41] == 0.0
     q, v, ql, vl, z = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -213,13 +215,12 @@ def predict(
     """
     n = len(measured[0])
     out, states = np.empty((n, 2)), np.empty((n, 4))
-    mass, bias, slope, reference, load = arrays
-    position, velocity = measured
     beside = np.zeros(len(u)) if beside is None else beside
     touch = np.zeros((3, 0)) if touch is None else touch
     at = np.full((len(np.atleast_2d(starts)), 4), np.nan)
     at[:, : np.shape(starts)[-1]] = starts
+    mass, bias, slope, reference, load = arrays
     run(
-        p, mass, bias, slope, reference, load, beside, touch, u, step, n_sub, position, velocity, gain, at, every or n, out, states
+        p, mass, bias, slope, reference, load, beside, touch, u, step, n_sub, *measured, gain, at, every or n, out, states
     )  # fmt: skip
     return out, states

@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.discrepancy.multibody.joint_forces import (
+    SLOTS,
     actuator_force,
     bristle_force_of,
     bristles_slid,
     cogging_force,
     delayed_input,
+    entries,
     friction_limit,
     pair_friction,
     stop_force,
@@ -40,6 +42,7 @@ JOINT_TORQUE_LIMITS = JointTorqueLimits()
 @numba.njit(cache=True, error_model="numpy", nogil=True)
 def _missing(p, mass, bias, load, beside, touch, u, step, motion, still, least, out):
     """Fill `out` (n_steps,), see `missing_torque`."""
+    p = entries(p, SLOTS)
     lagged, target, z = math.nan, u[0], 0.0
     keep = math.exp(-step / p[27]) if p[27] > 0.0 else 0.0
     half = math.exp(-0.5 * step / p[39]) if p[39] > 0.0 else 0.0

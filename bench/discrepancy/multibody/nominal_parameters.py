@@ -211,12 +211,8 @@ def base_slots(joint: Joint, on_link: bool) -> Array:
     p[Slot.INPUT_LAG], p[Slot.DELAY] = drive.lag, drive.delay
     p[Slot.DAMPING], p[Slot.LIMIT] = joint.damping, joint.friction
     p[Slot.STIFFNESS], p[Slot.REFERENCE] = joint.stiffness, joint.reference
-    p[Slot.MOTOR], p[Slot.ENCODER], p[Slot.STRIBECK], p[Slot.RATIO] = (
-        joint.armature,
-        float(on_link),
-        1.0,
-        drive.gear,
-    )
+    p[Slot.MOTOR], p[Slot.ENCODER] = joint.armature, float(on_link)
+    p[Slot.STRIBECK], p[Slot.RATIO] = 1.0, drive.gear
     return p
 
 
@@ -227,9 +223,7 @@ def move(p: Array, kind: str, by: float) -> None:
         return
     if kind == "forcerange":
         p[Slot.LOW] *= 1.0 + by / p[Slot.HIGH]
-    if (
-        kind == "kv" and p[Slot.SERVO] < 0.5 and p[Slot.KP] == p[Slot.KV]
-    ):  # of a velocity servo the two are one
+    if kind == "kv" and p[Slot.SERVO] < 0.5 and p[Slot.KP] == p[Slot.KV]:  # the two are one
         p[Slot.KP] += by
     for slot in LOCAL_SLOTS[kind]:
         p[slot] += by
