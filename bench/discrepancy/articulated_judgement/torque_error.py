@@ -32,7 +32,7 @@ from scipy.signal import welch
 from bench.arrays import Array
 from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_search.misfit import Octaves
-from bench.discrepancy.articulated_search.problem import ArticulatedProblem
+from bench.discrepancy.articulated_search.problem import ALL, ArticulatedProblem
 from bench.discrepancy.multibody.inputs import input_of
 from bench.discrepancy.multibody.joint_forces import Slot
 from bench.discrepancy.multibody.joint_torque import missing_torque
@@ -147,16 +147,16 @@ class TorqueProblem(ArticulatedProblem):
         position, velocity, _ = self.moved(prepared)[j].T
         return self.means(r, drive.torque(prepared.joints[j].command, position, velocity))
 
-    def residuals(self, j: int, hypothesis: JointHypothesis, vector: Array) -> list[Array]:
+    def residuals(self, j: int, hypothesis: JointHypothesis, vector: Array, part: slice = ALL) -> list[Array]:
         """Missing torque (n_intervals, 1) of joint `j` over that of noise, in every record."""
         return [
             self.missing(j, hypothesis, vector, r, prepared)[:, None] / self.levels[r].torque[j]
-            for r, prepared in enumerate(self.motions(hypothesis, vector))
+            for r, prepared in list(enumerate(self.motions(hypothesis, vector)))[part]
         ]
 
-    def residual(self, j: int, hypothesis: JointHypothesis, vector: Array) -> Array:
+    def residual(self, j: int, hypothesis: JointHypothesis, vector: Array, part: slice = ALL) -> Array:
         """All records in one (n,)."""
-        return np.concatenate([r.ravel() for r in self.residuals(j, hypothesis, vector)])
+        return np.concatenate([r.ravel() for r in self.residuals(j, hypothesis, vector, part)])
 
     @cached_property
     def octaves(self) -> Octaves:

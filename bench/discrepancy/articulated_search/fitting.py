@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from bench.discrepancy.articulated_search.misfit import Octaves
 from bench.discrepancy.articulated_search.problem import ArticulatedProblem
 from bench.discrepancy.numerics.least_squares import Prior, minimise
 from bench.discrepancy.numerics.made_once import MadeOnce
-from bench.discrepancy.numerics.threads import in_threads
+from bench.discrepancy.numerics.threads import THREADS, in_threads
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,19 +129,27 @@ def own_entries(problem: ArticulatedProblem, hypothesis: JointHypothesis, j: int
 class _Runs:
     """Residuals of joints at vectors of a hypothesis, the last few of every joint kept.
 
-    What one joint has of its own moves no other: most columns of a Jacobian take one run.
+    What one joint has of its own moves no other: most columns of a Jacobian take one run. A joint's records are run in parts, so that no
+    thread waits while a step is tried.
     """
 
     def __init__(self, problem: ArticulatedProblem, hypothesis: JointHypothesis) -> None:
         self.problem, self.hypothesis = problem, hypothesis
         self.entries = [problem.entries(j, hypothesis) for j in range(len(problem.joints))]
-        self.kept = [MadeOnce[Array](problem.settings.articulated.kept_runs) for _ in problem.joints]
+        n = len(problem.records)
+        ends = np.linspace(0, n, min(n, THREADS) + 1).astype(int).tolist()
+        self.parts = [slice(*ends_of) for ends_of in pairwise(ends)]
+        kept = problem.settings.articulated.kept_runs * len(self.parts)
+        self.kept = [MadeOnce[Array](kept) for _ in problem.joints]
 
-    def residual(self, j: int, vector: Array) -> Array:
-        """Residual of joint `j`, not to be written to."""
-        return self.kept[j].get(
-            vector[self.entries[j]].tobytes(), lambda: self.problem.residual(j, self.hypothesis, vector)
-        )
+    def residuals(self, joints: Sequence[int], vector: Array) -> list[Array]:
+        """Residuals of the records of joints, in parts, one joint after the other; not to be written to."""
+
+        def residual(j: int, part: slice) -> Array:
+            key = part.start, vector[self.entries[j]].tobytes()
+            return self.kept[j].get(key, lambda: self.problem.residual(j, self.hypothesis, vector, part))
+
+        return in_threads(lambda at: residual(*at), [(j, part) for j in joints for part in self.parts])
 
 
 def linearised(
@@ -195,19 +204,17 @@ class _Fitting:
         problem, others, shared = self.problem, self.others, list(self.problem.shared)
         settings = problem.settings.articulated
         units = [scale[j][problem.octaves.index[j]] for j in self.active]
+        every = np.concatenate([*units, np.ones(len(shared) * len(self.passive))])
 
         def residual_at(vector: Array) -> Array:
-            parts = in_threads(
-                lambda k: self.runs.residual(self.active[k], vector) / units[k], range(len(units))
-            )
+            parts = self.runs.residuals(self.active, vector)
             for j in self.passive:
                 assert others is not None
                 parts.append(others.factors[j] @ vector[shared] - others.targets[j])
-            return np.concatenate(parts)
+            return np.concatenate(parts) / every
 
         mean, std, low, high = problem.prior(self.hypothesis)
         reach = np.where(self.free < len(problem.nominal), settings.nominal_reach, settings.effect_reach)
-        every = np.concatenate([*units, np.ones(len(shared) * len(self.passive))])
         known = None if self.jacobian is None else self.jacobian / every[:, None]
         chosen = problem.settings.numerics
         if any(placed.effect.play and problem.joints[placed.joint].held for placed in self.hypothesis):
@@ -305,7 +312,7 @@ def _summary(fitting: _Fitting, vector: Array, curvature: Array) -> ArticulatedF
     chi2 = np.zeros_like(octaves.count)
     for j in range(len(problem.joints)):
         if j in fitting.active or others is None:
-            chi2[j] = octaves.power(j, fitting.runs.residual(j, vector))
+            chi2[j] = octaves.power(j, np.concatenate(fitting.runs.residuals([j], vector)))
         else:
             # what the other joints lose by bodies that suit this one
             shared = list(problem.shared)

@@ -37,6 +37,8 @@ from bench.discrepancy.numerics.deadline import NEVER, Deadline
 from bench.discrepancy.numerics.made_once import MadeOnce
 from bench.discrepancy.settings import DEFAULT, DiagnosisSettings
 
+ALL = slice(None)
+
 
 @dataclass(eq=False)
 class ArticulatedProblem:
@@ -131,10 +133,8 @@ class ArticulatedProblem:
         """Joints whose runs an effect of a hypothesis changes."""
         out: set[int] = set()
         for placed in hypothesis:
-            site = placed.effect.site
-            out |= set(
-                placed.joints if site in ("joint", "pair", "end", "actuator") else range(len(self.joints))
-            )
+            local = placed.effect.site in ("joint", "pair", "end", "actuator")
+            out |= set(placed.joints if local else range(len(self.joints)))
         return tuple(sorted(out))
 
     def entries(self, j: int, hypothesis: JointHypothesis) -> NDArray[np.int64]:
@@ -271,15 +271,15 @@ class ArticulatedProblem:
         """Indices of the nominal parameters of bodies."""
         return tuple(i for i, p in enumerate(self.nominal) if p.of_body)
 
-    def residuals(self, j: int, hypothesis: JointHypothesis, vector: Array) -> list[Array]:
+    def residuals(self, j: int, hypothesis: JointHypothesis, vector: Array, part: slice = ALL) -> list[Array]:
         """Whitened, weighted innovations (n, n_measured) of joint `j` in every record, less what its unknown start makes of them."""
         most, found = self.settings.articulated.diverged, []
         p = self.slots(j, hypothesis, vector, on_link=self.records[0].joints[j].on_link)
-        for original, prepared in zip(self.records, self.motions(hypothesis, vector), strict=True):
+        motions = self.motions(hypothesis, vector)
+        for original, prepared in zip(self.records[part], motions[part], strict=True):
             record = prepared.joints[j]
             out, _ = self.run(j, hypothesis, vector, record, record.gain, record.start, None, p)
-            left = whitened(original.joints[j], record, out, most)
-            found.append(self.start(j, original).taken_out(left))
+            found.append(self.start(j, original).taken_out(whitened(original.joints[j], record, out, most)))
         return found
 
     def start(self, j: int, prepared: PreparedRecord) -> UnknownStart:
@@ -297,9 +297,9 @@ class ArticulatedProblem:
         unknown = sum(self.start(j, r).log_determinant for r in self.records for j in range(len(self.joints)))
         return log_likelihood(self.records, self.octaves, power) - unknown
 
-    def residual(self, j: int, hypothesis: JointHypothesis, vector: Array) -> Array:
+    def residual(self, j: int, hypothesis: JointHypothesis, vector: Array, part: slice = ALL) -> Array:
         """Their cosine transforms, all records in one (n,); the squares of an octave sum to about its count where nothing is missing."""
-        return transformed(self.residuals(j, hypothesis, vector))
+        return transformed(self.residuals(j, hypothesis, vector, part))
 
     @cached_property
     def octaves(self) -> Octaves:
