@@ -211,7 +211,9 @@ class _Fitting:
             for j in self.passive:
                 assert others is not None
                 parts.append(others.factors[j] @ vector[shared] - others.targets[j])
-            return np.concatenate(parts) / every
+            found = np.concatenate(parts)
+            found /= every
+            return found
 
         mean, std, low, high = problem.prior(self.hypothesis)
         reach = np.where(self.free < len(problem.nominal), settings.nominal_reach, settings.effect_reach)

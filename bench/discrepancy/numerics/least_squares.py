@@ -236,7 +236,7 @@ def _descend(task: _Task, state: _State, difference: float, steps: range, jacobi
         if gained < max(task.settings.faithful * predicted, negligible):
             jacobian = None
         else:
-            jacobian, at = jacobian + np.outer(surprise, move / (move @ move)), None
+            jacobian, at = jacobian + np.outer(move / (move @ move), surprise).T, None
     return _Descent(state, jacobian, at, False, progressed, steps.stop)
 
 
@@ -297,18 +297,21 @@ def differences(
         (n_residuals, n_free) changes by the steps; None where a run diverged.
     """
 
-    def column(k: int) -> Array:
+    # each column in one piece of memory: to interleave them takes longer than all that is done with them
+    changes = np.empty((len(free), len(residual)))
+
+    def column(k: int) -> bool:
         moved = vector.copy()
         sign = 1.0 if moved[free[k]] + steps[k] <= high[k] else -1.0
         moved[free[k]] += sign * steps[k]
         shifted = residual_at(moved)
-        return sign * (shifted - residual) if shifted.shape == residual.shape else np.full(1, np.nan)
+        if shifted.shape != residual.shape:
+            return False
+        ahead, behind = (shifted, residual) if sign > 0.0 else (residual, shifted)
+        np.subtract(ahead, behind, out=changes[k])
+        return True
 
-    columns = in_threads(column, range(len(free)))
-    if any(c.shape != residual.shape for c in columns):
-        return None
-    # each column in one piece of memory: to interleave them takes longer than all that is done with them
-    return np.stack(columns).T if columns else np.zeros((len(residual), 0))
+    return changes.T if all(in_threads(column, range(len(free)))) else None
 
 
 def _jacobian(task: _Task, state: _State, difference: float) -> Array | None:
@@ -321,4 +324,6 @@ def _jacobian(task: _Task, state: _State, difference: float) -> Array | None:
         steps=difference * task.std,
         high=task.high,
     )
-    return None if changes is None else changes / difference
+    if changes is not None:
+        changes /= difference
+    return changes
