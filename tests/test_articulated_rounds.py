@@ -53,6 +53,21 @@ def test_a_number_that_no_judgement_believes_is_named_instead_of_what_it_hides(t
     assert named["coulomb_friction", "elbow"]["limit"] == pytest.approx(LIMIT, rel=0.1)
 
 
+def test_a_friction_that_closes_next_to_nothing_owes_its_form_to_noise():
+    """Beside a payload, of a twentieth of what friction is known to: whether it is higher at rest no record of this size tells."""
+    effects = {effect.name: effect for effect in CATALOGUE}
+    kinds = ("mass_error", "stribeck_friction", "stribeck_friction", "cogging", "coulomb_friction")
+    hypothesis = [SimpleNamespace(effect=effects[kind], key=(kind, f"j{k}")) for k, kind in enumerate(kinds)]
+
+    def left(power):
+        return SimpleNamespace(excess=np.array([power]))
+
+    small = 0.05
+    predictions, without = [left(100.0), left(1.0)], [left(60.0), left(1.2), left(2.0), left(1.01), None]
+    faint = further_fits.faint_frictions(hypothesis, predictions, without, small)
+    assert faint == {("stribeck_friction", "j1")}  # 0.2 of 100 is less than a twentieth of an amplitude, 1 is not
+
+
 def test_friction_in_the_place_of_another_law_begins_as_large_as_the_records_say(tmp_path):
     """Expected twenty times as large, it holds the joint; a fit does not find back from there."""
     small = 0.03

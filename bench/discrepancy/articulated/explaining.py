@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bench.discrepancy.articulated.further_fits import (
+    faint_frictions,
     rivals_beside,
     with_dry_friction,
     without_some,
@@ -28,6 +29,7 @@ from bench.discrepancy.articulated_judgement.judgement import (
     Kept,
     alike,
     kept,
+    keys_of,
     ladder,
     simplest,
     without_each,
@@ -214,7 +216,7 @@ class _Standing:
         """Go over to the plainest of what predicts as well where something is left, and drop what closes nothing beside the others."""
         problem, open_end = self.problem, not self.left.whole
         if open_end:
-            self.fits += with_dry_friction(problem, candidates, self.final)
+            self.fits += with_dry_friction(problem, candidates, self.final, keys_of(self.final))
             plain = simplest(self.fits, self.final, self._alike())
             plain = without_the_idle(problem, self.fits, plain, self.predicted)
             if plain is not self.final:
@@ -224,6 +226,12 @@ class _Standing:
         if open_end:
             self._go_over_to(without_the_idle(problem, self.fits, self.final, self.predicted))
             self.near = self._alike()
+        else:
+            small = problem.settings.articulated.judgement.small
+            faint = faint_frictions(self.final.hypothesis, self.predictions, self.without(), small)
+            plain = with_dry_friction(problem, candidates, self.final, faint)
+            self.fits += plain
+            self.near = {keys_of(f) for f in plain}
 
     def _go_over_to(self, final: ArticulatedFit) -> None:
         if final is self.final:

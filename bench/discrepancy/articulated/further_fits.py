@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from bench.discrepancy.articulated_effects.hypothesis import PlacedOnJoint
+from bench.discrepancy.articulated_effects.hypothesis import JointHypothesis, PlacedOnJoint
 from bench.discrepancy.articulated_judgement.judgement import keys_of, without_each
 from bench.discrepancy.articulated_judgement.predicted_errors import PredictedErrors
 from bench.discrepancy.articulated_search.fitting import ArticulatedFit
@@ -78,23 +78,61 @@ def without_some(
 
 
 def with_dry_friction(
-    problem: ArticulatedProblem, candidates: Sequence[PlacedOnJoint], final: ArticulatedFit
+    problem: ArticulatedProblem,
+    candidates: Sequence[PlacedOnJoint],
+    final: ArticulatedFit,
+    among: Collection[tuple[str, str]],
 ) -> list[ArticulatedFit]:
     """An explanation with dry friction in the place of each law of several parameters at a joint that has none, while there is time.
 
     It is what joints have most, and what a law with more to fit imitates first; the search may never have held the two side by side.
+
+    Args:
+        problem: Records for identification.
+        candidates: Effects at places.
+        final: What would be named.
+        among: Names and places of the effects that are asked about.
     """
     dry = {p.joint: p for p in candidates if p.effect.name == "coulomb_friction"}
     taken = {placed.joint for placed in final.hypothesis if placed.effect.name == "coulomb_friction"}
     out, ends = [], [0, *steps(problem, final.hypothesis)]
     for start, end in pairwise(ends):
         laws = [p for p in final.hypothesis[start:end] if p.effect.site == "joint" and p.effect.free > 1]
+        if not {p.key for p in laws} <= set(among):
+            continue
         if not laws or not {p.joint for p in laws} <= dry.keys() - taken:
             continue
         if not problem.deadline.allows("dry friction in the place of what is named"):
             break
         out.append(exchanged(problem, final, laws, [dry[p.joint] for p in laws]))
     return out
+
+
+def faint_frictions(
+    hypothesis: JointHypothesis,
+    predictions: Sequence[PredictedErrors],
+    without: Sequence[PredictedErrors | None],
+    small: float,
+) -> set[tuple[str, str]]:
+    """Names and places of frictions that contain dry friction and close next to nothing.
+
+    Laws of friction are off by a part of themselves on real joints. A friction whose power on the judging records is less than such a
+    part of the discrepancy owes its form to what little noise is not as it was stated.
+
+    Args:
+        hypothesis: Effects of an explanation.
+        predictions: Of the nominal model first, and of the explanation last.
+        without: Of the explanation without one effect after the other; None where it was never fitted so.
+        small: Part, an amplitude.
+    """
+    least = float(np.mean(predictions[-1].excess)) + small**2 * float(np.mean(predictions[0].excess))
+    return {
+        placed.key
+        for placed, rest in zip(hypothesis, without, strict=True)
+        if "coulomb_friction" in placed.effect.contains
+        and rest is not None
+        and float(np.mean(rest.excess)) < least
+    }
 
 
 def rivals_beside(
