@@ -75,13 +75,14 @@ class FreeRuns:
 
         A joint made heavier errs less by any torque that it misses, and explains no more of it. One where a servo holds it.
         """
-        inertias, damping, window = list[tuple[float, float]](), 0.0, 0.0
+        inertias, window = list[tuple[float, float]](), 0.0
+        p, numbers = self.problem.parameters(j, hypothesis, vector)
+        damping = max(float(p[Slot.DAMPING]), 0.0)
         for prepared in self.problem.records:
             record = prepared.joints[j]
-            p = self.problem.slots(j, hypothesis, vector, on_link=record.on_link)
-            _, inertia = self.problem.coefficients(record, hypothesis, vector)
+            _, inertia = record.coefficients(numbers)
             inertias.append((float(np.mean(record.inertia)), float(np.mean(inertia)) + p[Slot.INERTIA]))
-            damping, window = max(float(p[Slot.DAMPING]), 0.0), record.window * record.sample
+            window = record.window * record.sample
         if not window:
             return 1.0
         stated, found = np.mean(inertias, axis=0)

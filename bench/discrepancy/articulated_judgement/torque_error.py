@@ -122,12 +122,12 @@ class TorqueProblem(ArticulatedProblem):
     ) -> Array:
         """Mean torque (n_intervals,) that joint `j` misses in record `r`, whose encoders are as `prepared` has them."""
         record = prepared.joints[j]
-        p = self.slots(j, hypothesis, vector, on_link=record.on_link)
+        p, numbers = self.parameters(j, hypothesis, vector)
         p[Slot.RATIO] *= record.servo_ratio
         stated = base_slots(self.joints[j], record.on_link)
         # a drive that gives a part of what was logged is off by as much of what was logged
         part = p[Slot.GEAR] * p[Slot.KP] / (stated[Slot.GEAR] * stated[Slot.KP])
-        bias, inertia = self.coefficients(record, hypothesis, vector)
+        bias, inertia = record.coefficients(numbers)
         motion, still = self.moved(prepared)[j], self.levels[r].speed[j]
         torque = missing_torque(
             p, (inertia, bias, record.load(bias, inertia, p)), record.servo_command, record.step, motion, still,

@@ -204,6 +204,11 @@ class ArticulatedProblem:
                 placed.effect.slots(placed_values(placed, eta), p)
         return p
 
+    def parameters(self, j: int, hypothesis: JointHypothesis, vector: Array) -> tuple[Array, BodyNumbers]:
+        """Parameter vector of joint `j`, see `slots`, and the bodies: what is the same in every record."""
+        on_link = self.records[0].joints[j].on_link
+        return self.slots(j, hypothesis, vector, on_link=on_link), self.numbers(hypothesis, vector)
+
     def innovations(
         self, j: int, hypothesis: JointHypothesis, vector: Array, prepared: PreparedRecord
     ) -> tuple[Array, Array]:
@@ -221,12 +226,12 @@ class ArticulatedProblem:
         gain: Array,
         starts: Array,
         every: int | None,
-        p: Array | None = None,
+        known: tuple[Array, BodyNumbers] | None = None,
     ) -> tuple[Array, Array]:
-        """Innovations (n, 2) and states (n, 4) of joint `j` from `starts`, set anew after `every` samples, see `joint_run.predict`; `p` as
-        of `slots`, where it is known."""
-        bias, inertia = self.coefficients(record, hypothesis, vector)
-        p = self.slots(j, hypothesis, vector, on_link=record.on_link) if p is None else p.copy()
+        """Innovations (n, 2) and states (n, 4) of joint `j` from `starts`, set anew after `every` samples, see `joint_run.predict`; `known`
+        as of `parameters`."""
+        stated, numbers = known or self.parameters(j, hypothesis, vector)
+        (bias, inertia), p = record.coefficients(numbers), stated.copy()
         p[Slot.RATIO] *= record.servo_ratio
         return predict(
             p, (inertia, bias, record.slope, record.reference, record.load(bias, inertia, p)), record.servo_command, record.step,
@@ -247,14 +252,6 @@ class ArticulatedProblem:
         end = next((p.where for p in hypothesis if p.effect.site == "end" and j in p.joints), None)
         return None if end is None else record.touches[end]
 
-    def coefficients(
-        self, record: JointRecord, hypothesis: JointHypothesis, vector: Array
-    ) -> tuple[Array, Array]:
-        """Bias and inertia (n_steps,) of a joint's equation as a hypothesis has the bodies; not to be written to."""
-        changed, missing = self.numbers(hypothesis, vector)
-        felt = {body: by for body, by in changed.items() if record.bodies[body].felt}
-        return record.coefficients(BodyNumbers(felt, missing))
-
     def numbers(self, hypothesis: JointHypothesis, vector: Array) -> BodyNumbers:
         """The bodies as a hypothesis has them."""
         changed: dict[str, dict[str, float]] = {}
@@ -274,11 +271,10 @@ class ArticulatedProblem:
     def residuals(self, j: int, hypothesis: JointHypothesis, vector: Array, part: slice = ALL) -> list[Array]:
         """Whitened, weighted innovations (n, n_measured) of joint `j` in every record, less what its unknown start makes of them."""
         most, found = self.settings.articulated.diverged, []
-        p = self.slots(j, hypothesis, vector, on_link=self.records[0].joints[j].on_link)
-        motions = self.motions(hypothesis, vector)
+        known, motions = self.parameters(j, hypothesis, vector), self.motions(hypothesis, vector)
         for original, prepared in zip(self.records[part], motions[part], strict=True):
             record = prepared.joints[j]
-            out, _ = self.run(j, hypothesis, vector, record, record.gain, record.start, None, p)
+            out, _ = self.run(j, hypothesis, vector, record, record.gain, record.start, None, known)
             found.append(self.start(j, original).taken_out(whitened(original.joints[j], record, out, most)))
         return found
 

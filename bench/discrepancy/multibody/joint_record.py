@@ -144,19 +144,16 @@ class JointRecord:
 
     def coefficients(self, numbers: BodyNumbers) -> tuple[Array, Array]:
         """Bias and inertia (n_steps,) with bodies that are not as the model has them; not to be written to."""
-        changed, missing = numbers
-        key = (
-            tuple((body, *by.items()) for body, by in changed.items()),
-            tuple((body, *values.items()) for body, values in missing),
-        )
+        changed = [(body, by) for body, by in numbers.changed.items() if self.bodies[body].felt]
+        key = tuple(tuple((body, *by.items()) for body, by in some) for some in (changed, numbers.missing))
         with self._making:
             if key in self._made:
                 self._made.move_to_end(key)
                 return self._made[key]
         made = np.stack([self.bias, self.inertia])
-        for body, by in changed.items():
+        for body, by in changed:
             self.bodies[body].change(made, by)
-        for body, values in missing:
+        for body, values in numbers.missing:
             made += self._left_out(body, values)
         found = made[0], np.maximum(made[1], JOINT_RECORD_SETTINGS.lightest * self.inertia)
         with self._making:
