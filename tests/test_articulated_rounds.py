@@ -65,7 +65,8 @@ def test_a_friction_that_closes_next_to_nothing_owes_its_form_to_noise():
     small = 0.05
     predictions, without = [left(100.0), left(1.0)], [left(60.0), left(1.2), left(2.0), left(1.01), None]
     faint = further_fits.faint_frictions(hypothesis, predictions, without, small)
-    assert faint == {("stribeck_friction", "j1")}  # 0.2 of 100 is less than a twentieth of an amplitude, 1 is not
+    # 0.2 of 100 is less than a twentieth of an amplitude, 1 is not
+    assert faint == {("stribeck_friction", "j1")}
 
 
 def test_friction_in_the_place_of_another_law_begins_as_large_as_the_records_say(tmp_path):
