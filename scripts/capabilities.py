@@ -279,12 +279,13 @@ CAPABILITIES: Sequence[Capability] = (
         data="robots",
     ),
     _excitation_task(
-        "sdof", "Excitation on the SDOF rig: trained policy against the baselines, held-out rigs"
+        "sdof", "Excitation on the SDOF rig: trained policy and planners against the baselines, held-out rigs"
     ),
     _excitation_task(
         "joint", "Excitation of the joint with two loads: trained policy against the baselines, held-out rigs"
     ),
     _excitation_task("rivals", "Excitation that tells rivals apart: trained policy against the baselines"),
+    _benchmark_group("decisions", "What a decision takes while a test runs"),
     Capability(
         "backgrounds_sdof",
         "Policy `sdof` on rigs with a background that no hypothesis holds",

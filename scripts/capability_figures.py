@@ -149,7 +149,7 @@ def backgrounds(told: Any) -> Figures:
     for where in ("without background", "with background"):
         for kind, group in told[where].items():
             for name, row in group.items():
-                if name.startswith(("policy", "planner")):
+                if name.startswith(("policy", "planner", "paced")):
                     low, high = row["ratio_interval"]
                     what = f"rigs {where}, {kind}, {name}: of the best open-loop method's error ({row['best_open_loop']})"
                     figures.append((what, f"{row['ratio']:.3g} ({low:.3g} to {high:.3g})", "≤ 0.8"))

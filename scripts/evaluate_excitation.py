@@ -33,6 +33,7 @@ from bench.errors import BenchError
 from bench.excitation import (
     METHODS,
     Experiment,
+    PacedPlanner,
     RigPrior,
     RivalPlanner,
     Rivals,
@@ -58,7 +59,7 @@ class Args:
     Attributes:
         task: sdof, joint, rivals (on the SDOF rig) or joint_rivals.
         policies: Policies by name or file; by default the one that comes with the task, if there is one.
-        planner: Also the planner.
+        planner: Also the planners.
         methods: Baselines.
         seeds: Seeds.
         rigs: Rigs a seed.
@@ -249,6 +250,7 @@ def contest_of(args: Args, tell: Callable[[str], None] = lambda name: None) -> C
     if args.planner and isinstance(question, RigPrior):
         opening = designed(args, "d_optimal", setup, experiments)[0]
         sources["planner"] = Planner(question, setup.station(), opening)
+        sources["paced planner"] = PacedPlanner(question, setup.station(), opening)
     elif args.planner:
         asked: list[Any] = experiments  # of rivals, on pairs of draws
         sources["planner"] = [RivalPlanner(e.question, setup.station(), e.draws) for e in asked]

@@ -554,7 +554,7 @@ def test_excite_designs_for_a_background_by_planning_alone(
         told[name] = json.loads(capsys.readouterr().out)["notes"]
     assert "prior standard deviations over all backgrounds" in told["planned"][-1]
     assert told["open"] == [
-        "[[experiment.background]] is left out of account by this method; --method planner designs for it"
+        "[[experiment.background]] is left out of account by this method; --method planner and paced design for it"
     ]
     assert not any("background" in note for note in told["unasked"])
 

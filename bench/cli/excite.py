@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bench.cli.console import emit, progress_bar
+from bench.cli.excite_closed_loop import from_paced, from_planner, from_policy, from_rival_planner
 
 METHODS = {
     "dopt": "d_optimal",
@@ -21,17 +22,12 @@ METHODS = {
     "sweep": "log_sweep",
     "prbs": "prbs",
     "planner": "",
+    "paced": "",
     "policy": "",
 }
 
 
-CLOSED_LOOP = (
-    "the force is shaped while measuring: this is what happens on the rig of the file. On a shaker, run it in closed loop "
-    "(bench.excitation.Planner, find_policy); replayed open-loop on another rig it need not keep the limits"
-)
-NO_BACKGROUND = (
-    "[[experiment.background]] is left out of account by this method; --method planner designs for it"
-)
+NO_BACKGROUND = "[[experiment.background]] is left out of account by this method; --method planner and paced design for it"
 
 
 @dataclass
@@ -45,7 +41,7 @@ class Excite:
     configuration: tyro.conf.Positional[Path]
     """Rig and experiment (TOML or JSON); or a verdict whose next test a planner can shape."""
     method: str = "dopt"
-    """dopt (best open-loop one), multisine, schroeder, crest, sweep, prbs; or, shaped while measuring, planner or policy."""
+    """dopt (best open-loop one), multisine, schroeder, crest, sweep, prbs; or, shaped while measuring, planner, paced or policy."""
     policy: str = ""
     """Trained policy by name or file (.npz), with --method policy."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("excitation.csv")
@@ -110,17 +106,25 @@ class Excite:
 
     def _made(self, asked: Any, rng: Any, show: Any) -> tuple[Any, list[str]]:
         """What the method makes of what is asked, and what the reader must know of it."""
+        from bench.errors import ParameterError
         from bench.excitation import Rivals, design
 
         unused = [NO_BACKGROUND] if asked.background else []
         if self.method == "policy":
-            made, notes = _from_policy(asked, self.policy, rng)
+            made, notes = from_policy(asked, self.policy, rng)
             return made, [*notes, *unused]
-        if self.method == "planner" and isinstance(asked.experiment.question, Rivals):
+        rivals = isinstance(asked.experiment.question, Rivals)
+        if self.method == "planner" and rivals:
             show("planning", 0.0)
-            return _from_rival_planner(asked, rng)
+            return from_rival_planner(asked, rng)
+        if self.method == "paced" and rivals:
+            raise ParameterError(
+                "--method paced designs for the parameters of one explanation, and a rival came; take --method planner"
+            )
+        # a background spoils what a D-optimal opening tells
+        opening = "crest_multisine" if asked.background else "d_optimal"
         made = design(
-            METHODS[self.method] or "d_optimal",
+            METHODS[self.method] or opening,
             asked.experiment,
             duration=asked.duration,
             band=asked.band,
@@ -128,10 +132,10 @@ class Excite:
             evaluations=self.evaluations,
             progress=lambda n, merit: show(f"{n} signals, {merit:.2f} nat", n / self.evaluations),
         )
-        if self.method != "planner":
+        if METHODS[self.method]:
             return made, unused
         show("planning", 1.0)
-        return _from_planner(asked, made, rng)
+        return (from_planner if self.method == "planner" else from_paced)(asked, made, rng)
 
     def _check(self) -> None:
         """Raise an error for arguments that do not go together."""
@@ -181,114 +185,6 @@ def _tell(result: dict[str, Any]) -> None:
     Console().print(table)
     for note in result["notes"]:
         Console(stderr=True).print(f"note: {note}", style="yellow", markup=False, highlight=False)
-
-
-def _from_policy(asked: Any, name: str, rng: Any) -> tuple[Any, list[str]]:
-    """What a policy does on the rig as it is described, and what the reader must know of it."""
-    from bench.errors import ParameterError
-    from bench.excitation import Ensemble, find_policy
-    from bench.excitation.closed_loop import disturbances, run_policy
-
-    policy, limits = find_policy(name), asked.experiment.limits
-    station = policy.station
-    if set(station.actuators) != set(limits.actuators) or asked.rig.timestep != station.timestep:
-        raise ParameterError(
-            f"policy '{name}' drives {', '.join(station.actuators)} every {station.timestep:g} s; this experiment drives "
-            f"{', '.join(limits.actuators)} with a timestep of {asked.rig.timestep:g} s: set the timestep, or use --method dopt"
-        )
-    one = Ensemble((asked.rig,), station.channels, station.actuators)
-    runs = run_policy(policy, one.packed, disturbances(station, 1, rng))
-    columns = [station.actuators.index(actuator) for actuator in limits.actuators]
-    controls = runs.records.controls[0][:, columns]
-    made = _closed_loop(asked, f"policy '{name}'", controls)
-    notes = [CLOSED_LOOP]
-    if abs(asked.duration - station.duration) > 1e-9:
-        notes.append(f"the policy's test lasts {station.duration:g} s, not {asked.duration:g} s")
-    return made, notes
-
-
-def _from_planner(asked: Any, opening: Any, rng: Any) -> tuple[Any, list[str]]:
-    """What the planner does on the rig as it is described, from a D-optimal opening."""
-    from bench.excitation import Planner
-    from bench.excitation.methods import controls_from
-
-    controls = controls_from(opening)
-    station = _station(asked, 1, len(controls))
-    planner = Planner(asked.experiment.question, station, controls, background=asked.background)
-    made, plans = _planned(asked, planner, rng)
-    over = " over all backgrounds" if asked.background else ""
-    notes = [
-        f"at {plan.time:g} s: "
-        + ", ".join(f"{name} {value:.4g}" for name, value in plan.values.items())
-        + f"; expected error at the end {plan.predicted:.2g} prior standard deviations{over}"
-        for plan in plans
-    ]
-    return made, [CLOSED_LOOP, *notes]
-
-
-def _from_rival_planner(asked: Any, rng: Any) -> tuple[Any, list[str]]:
-    """What the planner for rivals does on the rig as it is described, and how sure it is of that rig on the way."""
-    from bench.excitation import RivalPlanner
-
-    experiment = asked.experiment
-    station = _station(asked, 1, round(asked.duration / experiment.timestep))
-    planner = RivalPlanner(experiment.question, station, experiment.draws)
-    made, plans = _planned(asked, planner, rng)
-    notes = [
-        f"at {plan.time:.2f} s: log Bayes factor in favour of the rig of the file {plan.log_odds:.1f} nat "
-        "(certain with 99 % from 4.6 on)"
-        for plan in plans[1:]
-    ]
-    return made, [CLOSED_LOOP, *notes]
-
-
-def _station(asked: Any, n_steps: int, n_windows: int) -> Any:
-    from bench.excitation import Station
-
-    experiment = asked.experiment
-    scale = dict.fromkeys(experiment.channels, 1.0) | experiment.limits.watched
-    return Station(
-        experiment.noise, scale, experiment.limits, experiment.timestep, n_steps, n_windows, asked.band
-    )
-
-
-def _planned(asked: Any, planner: Any, rng: Any) -> tuple[Any, list[Any]]:
-    """What a planner does on the rig as it is described, and its plans."""
-    from bench.excitation import Ensemble
-    from bench.excitation.closed_loop import disturbances
-
-    plans: list[Any] = []
-    station = planner.station
-    one = Ensemble((asked.rig,), station.channels, station.actuators)
-    runs = planner.run(one.packed, disturbances(station, 1, rng), told=lambda _, plan: plans.append(plan))
-    return _closed_loop(asked, "the planner", runs.records.controls[0]), plans
-
-
-def _closed_loop(asked: Any, what: str, controls: Any) -> Any:
-    """Commands of a closed loop as a design, held against the limits on the rig as it is described."""
-    from bench.errors import ParameterError
-    from bench.excitation import Design, Ensemble
-    from bench.excitation.limits import peaks
-    from bench.signals import Excitation
-    from bench.signals.record import Record
-
-    limits = asked.experiment.limits
-    here = Ensemble((asked.rig,), tuple(limits.watched), limits.actuators)
-    reached = peaks(here, limits, controls)
-    over = [
-        f"{kind} of {entry} ({100.0 * share:.0f} %)"
-        for kind, entries in reached._asdict().items()
-        for entry, share in entries.items()
-        if share > 1.0 + 1e-9
-    ]
-    if over:
-        raise ParameterError(
-            f"{what} exceeds {', '.join(over)} on this rig, whose limits or parameters it was not made for; use --method dopt"
-        )
-    rate = 1.0 / asked.experiment.timestep
-    signals = {actuator: Record(controls[:, i], rate) for i, actuator in enumerate(limits.actuators)}
-    merit = float(asked.experiment.merit(controls[None])[0])
-    return Design(what, Excitation(signals, len(controls) / rate, rate), merit, reached, 1)
 
 
 def _write(path: Path, excitation: Any, rig: Any) -> None:

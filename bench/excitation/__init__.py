@@ -34,6 +34,7 @@ from bench.excitation.information import (
 from bench.excitation.limits import Limits, Peaks, feasible
 from bench.excitation.linear_structure import AffineStructure, linear_structure
 from bench.excitation.methods import METHODS, Design, controls_from, design, paired_experiment
+from bench.excitation.paced import PacedPlanner
 from bench.excitation.plan_policy import PlanPolicy, PlanStage
 from bench.excitation.planner import Decision, Planner
 from bench.excitation.policy import Policy, find_policy, policy_names
@@ -59,6 +60,7 @@ __all__ = [
     "Experiment",
     "Family",
     "Limits",
+    "PacedPlanner",
     "Peaks",
     "PlanPolicy",
     "PlanStage",

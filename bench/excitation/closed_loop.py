@@ -6,7 +6,7 @@ Both are measured with the same noise and end at the same limit switch, which ma
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,7 @@ def run_policy(
     *,
     station: Station | None = None,
     question: int = 0,
+    memory: Any = None,
 ) -> Runs:
     """Run a policy on rigs from rest.
 
@@ -51,6 +52,7 @@ def run_policy(
         disturbance: Noise of the sensors, see `disturbances`.
         station: Where they stand; by default where the policy was trained.
         question: Place of the question asked among the station's.
+        memory: What `policy.memory` gave for as many tests; made here where it is of no further use.
 
     Raises:
         ParameterError: The policy does not fit the station.
@@ -72,7 +74,7 @@ def run_policy(
     observation = desk.observe(
         places, disturbance[:, -1], np.zeros((m, n, width)), np.zeros((m, desk.shaping.width)), asked
     )
-    memory = policy.memory(m)
+    memory = policy.memory(m) if memory is None else memory
     for window in range(station.n_windows):
         actions = policy.act(observation, memory).astype(float)
         commands, _ = desk.commands(places, actions)

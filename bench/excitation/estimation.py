@@ -83,8 +83,8 @@ class Records:
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def _squares(outputs, measured, weights, lengths, squares):
-    """Squared whitened residual of each of the rigs of each record."""
+def squared_residuals(outputs, measured, weights, lengths, squares):
+    """Write the squared whitened residual of each of the rigs of each record."""
     for m in range(outputs.shape[0]):
         for k in range(outputs.shape[1]):
             total = 0.0
@@ -96,8 +96,8 @@ def _squares(outputs, measured, weights, lengths, squares):
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def _normal(outputs, measured, weights, lengths, step, fisher, score):
-    """``J'J`` and ``J'r`` from records of rigs and their perturbed ones."""
+def add_normal_equations(outputs, measured, weights, lengths, step, fisher, score):
+    """Add ``J'J`` and ``J'r`` from records of rigs and their perturbed ones."""
     p = outputs.shape[1] - 1
     row = np.zeros(p)
     for m in range(outputs.shape[0]):
@@ -125,7 +125,7 @@ def costs(
     for first in range(0, m, size):
         rows = slice(first, first + size)
         outputs = family.record(coordinates[rows], records.controls[rows])
-        _squares(outputs, records.measured[rows], 1.0 / noise, records.lengths[rows], result[rows])
+        squared_residuals(outputs, records.measured[rows], 1.0 / noise, records.lengths[rows], result[rows])
     result += np.sum(coordinates**2, axis=2)
     return np.where(np.isfinite(result), result, np.inf)
 
@@ -140,7 +140,7 @@ def normal_equations(
     for first in range(0, m, size):
         rows = slice(first, first + size)
         outputs = family.record(fans(coordinates[rows], INFORMATION_LIMITS.step), records.controls[rows])
-        _normal(
+        add_normal_equations(
             outputs, records.measured[rows], 1.0 / noise, records.lengths[rows], INFORMATION_LIMITS.step, fisher[rows], score[rows]
         )  # fmt: skip
     return fisher, score

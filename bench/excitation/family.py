@@ -30,6 +30,7 @@ class FamilySettings:
 SETTINGS = FamilySettings()
 
 _AFFINE = ("constants", "coefficients", "theta")
+_SAME = tuple(name for name in Packed._fields if name not in {"rows", "columns", *_AFFINE})
 
 
 @dataclass(eq=False)
@@ -49,7 +50,9 @@ class Family:
     channels: tuple[str, ...]
     actuators: tuple[str, ...]
     _packed: Packed = field(init=False, repr=False)
-    _slopes: dict[str, NDArray[np.float64]] = field(init=False, repr=False)
+    _slopes: dict[str, NDArray[np.float64]] = field(
+        init=False, repr=False
+    )  # (p, size of a rig's rows) by a unit
 
     def __post_init__(self) -> None:
         self.channels, self.actuators = tuple(self.channels), tuple(self.actuators)
@@ -58,12 +61,19 @@ class Family:
         places = np.concatenate([np.zeros((1, p)), 1.7 * np.eye(p), check[None]])
         rigs = tuple(self.hypothesis.at(row).rig for row in places)
         packed = Ensemble(rigs, self.channels, self.actuators).packed
+        self._places = (
+            np.array([parameter.range for parameter in self.hypothesis.parameters]).reshape(-1, 2).T
+        )
+        self._logarithmic = np.array(
+            [item.scale == "logarithmic" for item in self.hypothesis.parameters], dtype=bool
+        )
         values = self.values(places)
         self._slopes = {}
         for name in _AFFINE:
             rows = getattr(packed, name)
-            change = np.diag(values[1:-1] - values[0]).reshape(-1, *(1,) * (rows.ndim - 1))
-            self._slopes[name] = (rows[1:-1] - rows[0]) / change
+            change = np.diag(values[1:-1] - values[0])[:, None]
+            self._slopes[name] = (rows[1:-1] - rows[0]).reshape(p, -1) / change
+        self._middle = values[0]
         self._packed = packed._replace(
             **{name: array[:1] for name, array in packed._asdict().items() if name not in {"rows", "columns"}}
         )
@@ -101,27 +111,19 @@ class Family:
 
     def values(self, coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values of the parameters ``(…, p)`` at standardised coordinates ``(…, p)``."""
-        result = np.empty_like(coordinates, dtype=float)
-        for i, parameter in enumerate(self.hypothesis.parameters):
-            middle, spread = parameter.range
-            place = middle + spread * coordinates[..., i]
-            result[..., i] = np.exp(place) if parameter.scale == "logarithmic" else place
-        return result
+        middle, spread = self._places
+        place = middle + spread * coordinates
+        return np.where(self._logarithmic, np.exp(np.where(self._logarithmic, place, 0.0)), place)
 
     def packed(self, coordinates: NDArray[np.float64]) -> Packed:
         """Rigs at standardised coordinates ``(n_rigs, p)`` for `bench.excitation.ensemble.integrate_cases`."""
         n, base = len(coordinates), self._packed
-        offsets = self.values(coordinates) - self.values(np.zeros((1, self.n_parameters)))
+        offsets = self.values(coordinates) - self._middle
         affine = {
-            name: getattr(base, name) + np.tensordot(offsets, slope, axes=1)
-            for name, slope in self._slopes.items()
+            name: rows + (offsets @ self._slopes[name]).reshape(n, *rows.shape[1:])
+            for name, rows in zip(_AFFINE, (base.constants, base.coefficients, base.theta), strict=True)
         }
-        same = {
-            name: np.broadcast_to(array, (n, *array.shape[1:])).copy()
-            for name, array in base._asdict().items()
-            if name not in {"rows", "columns", *_AFFINE}
-        }
-        return base._replace(**affine, **same)
+        return base._replace(**affine, **{name: getattr(base, name).repeat(n, axis=0) for name in _SAME})
 
     def record(self, coordinates: NDArray[np.float64], controls: NDArray[np.float64]) -> NDArray[np.float64]:
         """Records from rest of several rigs under each of several drives.

@@ -10,6 +10,20 @@ from bench.errors import ParameterError, UnknownNameError
 SHAPINGS = ("knots", "amplitude_frequency")
 
 
+def through_knots(knots: NDArray[np.float64], last: NDArray[np.float64], part: int) -> NDArray[np.float64]:
+    """Commands ``(m, n_knots * part, n_actuators)`` that reach each knot along half a cosine.
+
+    Args:
+        knots: ``(m, n_knots, n_actuators)``.
+        last: Where the commands are before the first ``(m, n_actuators)``.
+        part: Steps from knot to knot.
+    """
+    before = np.concatenate([last[:, None], knots[:, :-1]], axis=1)
+    rise = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, part + 1) / part)
+    shaped = before[:, :, None] + rise[:, None] * (knots - before)[:, :, None]
+    return shaped.reshape(len(knots), -1, knots.shape[2])
+
+
 class Shaping:
     """Commands of a window from an action, continuous from window to window.
 
@@ -61,12 +75,9 @@ class Shaping:
                     f"a window of {n_steps} steps does not divide into {self.n_knots} equal parts; choose another window or n_knots"
                 )
             knots = actions.reshape(m, self.n_knots, -1)
-            before = np.concatenate([self._last[places][:, None], knots[:, :-1]], axis=1)
-            part = n_steps // self.n_knots
-            rise = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, part + 1) / part)
-            shaped = before[:, :, None] + rise[:, None] * (knots - before)[:, :, None]
+            shaped = through_knots(knots, self._last[places], n_steps // self.n_knots)
             self._last[places] = knots[:, -1]
-            return shaped.reshape(m, n_steps, -1)
+            return shaped
         pair = 0.5 + 0.5 * actions.reshape(m, -1, 2)
         along = np.arange(1, n_steps + 1)[:, None] / n_steps
         level = self._last[places][:, None] + along * (pair[..., 0] - self._last[places])[:, None]

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -143,6 +144,17 @@ class Station(Instrumented):
         return cls(limits=Limits(**entry.limits.given), **rest)
 
 
+@numba.njit(cache=True, error_model="numpy", nogil=True)
+def _largest(measured, places, bounds, found):
+    """Write the largest magnitude of some channels over their bounds ``(m,)``; NaN where one is."""
+    for m in range(measured.shape[0]):
+        for i in range(measured.shape[1]):
+            for k in range(places.size):
+                share = abs(measured[m, i, places[k]]) / bounds[k]
+                if share > found[m] or share != share:  # noqa: PLR0124  (NaN stays: nothing is larger)
+                    found[m] = share
+
+
 class Desk:
     """The books on several rigs.
 
@@ -166,7 +178,10 @@ class Desk:
         self.force = np.array([limits.force[name] for name in actuators])
         self.budget = np.array([limits.energy.get(name, np.inf) for name in actuators])
         self._watch = [
-            ([station.channels.index(name) for name in table], np.array(list(table.values())))
+            (
+                np.array([station.channels.index(name) for name in table], dtype=np.int64),
+                np.array(list(table.values())),
+            )
             for table in (limits.stroke, limits.velocity)
         ]
         self.window = np.zeros(n, dtype=np.int64)
@@ -212,13 +227,10 @@ class Desk:
 
     def reached(self, measured: NDArray[np.float64]) -> NDArray[np.float64]:
         """Largest stroke and velocity in measurements ``(m, n, n_channels)``, as fractions of the limits ``(m, 2)``."""
-        columns = [
-            np.max(np.abs(measured[:, :, places]) / bounds, axis=(1, 2))
-            if places
-            else np.zeros(len(measured))
-            for places, bounds in self._watch
-        ]
-        return np.stack(columns, axis=1)
+        found = np.zeros((len(measured), 2))
+        for kind, (places, bounds) in enumerate(self._watch):
+            _largest(measured, places, bounds, found[:, kind])
+        return found
 
     def observe(
         self,

@@ -16,7 +16,7 @@ import numpy as np
 from evaluate_excitation import interval, middle
 from numpy.typing import NDArray
 
-from bench.excitation import Planner, PlanPolicy, Policy, RigPrior, estimate
+from bench.excitation import PacedPlanner, Planner, PlanPolicy, Policy, RigPrior, estimate
 from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
 from bench.excitation.stepping import Packed
 from bench.files import write_text
@@ -26,7 +26,7 @@ from policies.judge import HELD_OUT, fingerprint
 
 from .trials import kinds_of, open_loop
 
-Source = Policy | PlanPolicy | Planner | NDArray[np.float64]
+Source = Policy | PlanPolicy | PacedPlanner | Planner | NDArray[np.float64]
 BASELINES = ("random_multisine", "schroeder", "crest_multisine", "log_sweep", "prbs", "d_optimal")
 
 
@@ -83,7 +83,7 @@ def contest(
         policies: Policies by name.
         seeds: Seeds of rigs.
         rigs: Rigs a seed, each without and with its background.
-        planner: Also the planner, and the one that designs for backgrounds.
+        planner: Also the planners, those at the pace of the test among them, and those that design for backgrounds.
         folder: Where the rows of every seed are kept.
         tell: Called with what is done.
     """
@@ -93,9 +93,11 @@ def contest(
     opened = open_loop(setup, np.random.default_rng(HELD_OUT - 1))
     sources: dict[str, Source] = {**opened, **policies}
     if planner:
-        opening = opened["d_optimal"]
-        sources["planner"] = Planner(prior, station, opening)
-        sources["planner for backgrounds"] = Planner(prior, station, opening, background=background_of(setup))
+        # what a D-optimal design tells much of, a background spoils
+        backed = (" for backgrounds", background_of(setup), opened["crest_multisine"])
+        for suffix, background, opening in (("", (), opened["d_optimal"]), backed):
+            sources[f"planner{suffix}"] = Planner(prior, station, opening, background=background)
+            sources[f"paced planner{suffix}"] = PacedPlanner(prior, station, opening, background=background)
     made_with = json.dumps([str(setup.recipe), rigs, {name: _made_of(own) for name, own in sources.items()}])
     digest = hashlib.sha256(made_with.encode()).hexdigest()[:12]
     rows = []
@@ -109,7 +111,7 @@ def contest(
 
 def _made_of(source: Source) -> str:
     """What tells a method from others of its name."""
-    background = str(source.background) if isinstance(source, Planner) else ""
+    background = str(source.background) if isinstance(source, Planner | PacedPlanner) else ""
     return fingerprint([source] if isinstance(source, np.ndarray) else source) + background
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bench.excitation import (
     Family,
+    PacedPlanner,
     PlanPolicy,
     Policy,
     RigPrior,
@@ -18,6 +19,7 @@ from bench.excitation import (
 )
 from bench.excitation.closed_loop import Runs, disturbances, run_commands, run_policy
 from bench.excitation.estimation import Records, estimate
+from bench.excitation.paced import SETTINGS as PACED_SETTINGS
 from bench.excitation.planner import Planner
 from bench.excitation.stepping import Packed
 from envs.setups import Setup
@@ -50,7 +52,7 @@ def hidden(setup: Setup, seed: int, rigs: int) -> Iterator[tuple[int, str, NDArr
         )
 
 
-Source = Policy | PlanPolicy | Planner | list[RivalPlanner] | list[NDArray[np.float64]]
+Source = Policy | PlanPolicy | PacedPlanner | Planner | list[RivalPlanner] | list[NDArray[np.float64]]
 
 
 class Judge:
@@ -173,6 +175,8 @@ def fingerprint(source: Source) -> str:
             arrays += [np.array(stage.window), stage.plans, *stage.weights, *stage.biases]
     elif isinstance(source, Planner):
         arrays = [source.opening, np.array([*source.decisions, source.generations])]
+    elif isinstance(source, PacedPlanner):
+        arrays = [source.opening, np.frombuffer(str(PACED_SETTINGS).encode(), dtype=np.uint8)]
     elif isinstance(source[0], RivalPlanner):
         first = source[0]
         settings = (first.interval, first.horizon, first.knot, first.generations, first.samples)
