@@ -91,7 +91,7 @@ def test_with_a_background_a_rest_is_expected_to_leave_what_both_leave() -> None
     follower = Follower(tuple(map(Bank.of, FAMILIES, PRIOR.weights)), NOISE, STATION.n_samples, 1)
     follower.append(sweep()[:320], np.zeros((320, 3)))
     knots = 0.2 * np.sin(np.linspace(0.0, 25.0, 120))[None, :, None]
-    errors, made = KnownRig(FAMILIES[2], x, Desk(STATION, 1), follower, real).weigh(knots, follower)
+    errors, made = KnownRig(real, x, Desk(STATION, 1), follower).weigh(knots, follower)
     whole = np.concatenate([sweep()[:320], 2.0 * through_knots(made, sweep()[None, 319] / 2.0, 4)[0]])
     left = errors_left(real, x, whole[None], NOISE)
     assert errors[0] == pytest.approx(

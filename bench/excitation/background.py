@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from bench.excitation.family import Family, fans
 from bench.excitation.prior import RigHypothesis, Uncertain
+from bench.excitation.stepping import Packed, integrate_cases
 from bench.laws import find_law
 from bench.rig import Element
 
@@ -98,6 +99,46 @@ def expected_error(information: NDArray[np.float64], score: NDArray[np.float64])
     return np.sqrt(square / p)
 
 
+def neighbours(real: Family, x: NDArray[np.float64], step: float) -> Packed:
+    """A rig, and it moved by a step along one coordinate after the other, all without the laws of a background.
+
+    Args:
+        real: The hypothesis with its background, see `with_background`, or without one.
+        x: The rig ``(p,)``, standardised, without its background's coordinates.
+        step: In prior standard deviations.
+    """
+    terms = real.n_parameters - len(x)
+    packed = real.packed(fans(np.append(x, np.zeros(terms)), step)[: 1 + len(x)])
+    own = packed.kernels.shape[1] - terms
+    by_element = ("kernels", "sizes", "motion", "inputs", "theta")
+    rows = {name: np.ascontiguousarray(getattr(packed, name)[:, :own]) for name in by_element}
+    return packed._replace(**rows) if own and terms else packed
+
+
+def term_rigs(real: Family, x: NDArray[np.float64], size: float) -> Packed:
+    """A rig with one term of its background after the other, of so many standard deviations.
+
+    Args:
+        real: The hypothesis with its background, see `with_background`.
+        x: The rig ``(p,)``, standardised, without its background's coordinates.
+        size: Of the term.
+    """
+    terms = real.n_parameters - len(x)
+    packed = real.packed(np.concatenate([np.tile(x, (terms, 1)), size * np.eye(terms)], axis=1))
+    background = packed.kernels.shape[1] - terms + np.arange(terms)
+    for rig, element in enumerate(background):  # laws whose parameter is zero exert nothing, and need not run
+        packed.kernels[rig, background[background != element]] = 0
+    return packed
+
+
+def _records(packed: Packed, controls: NDArray[np.float64], timestep: float) -> NDArray[np.float64]:
+    """Records from rest of all rigs under each of several drives ``(n_cases, n_rigs, n, n_channels)``."""
+    cases, rigs = len(controls), len(packed.start)
+    states = packed.start[None].repeat(cases, axis=0)
+    members, counts = np.arange(rigs)[None].repeat(cases, axis=0), np.full(cases, rigs)
+    return integrate_cases(packed, controls, states, members=members, counts=counts, timestep=timestep)
+
+
 class ErrorsLeft(NamedTuple):
     """What identification is expected to leave of one rig after each of k excitations, as by `errors_left`."""
 
@@ -122,10 +163,9 @@ def errors_left(
         noise: Standard deviations of the channels ``(n_channels,)``.
     """
     p, k = len(x), len(controls)
-    points = fans(np.append(x, np.zeros(real.n_parameters - p)), SETTINGS.step)
-    points[1 + p :, p:] /= SETTINGS.step  # a term at its standard deviation
-    y = real.record(np.broadcast_to(points, (k, *points.shape)), controls)
-    apart = ((y[:, 1:] - y[:, :1]) / noise).reshape(k, len(points) - 1, -1)
+    packs = (neighbours(real, x, SETTINGS.step), term_rigs(real, x, 1.0))
+    y = np.concatenate([_records(packed, controls, real.timestep) for packed in packs], axis=1)
+    apart = ((y[:, 1:] - y[:, :1]) / noise).reshape(k, real.n_parameters, -1)
     slopes, terms = apart[:, :p] / SETTINGS.step, apart[:, p:]
     information, score = slopes @ slopes.transpose(0, 2, 1), slopes @ terms.transpose(0, 2, 1)
     known = np.isfinite(information).all(axis=(1, 2)) & np.isfinite(score).all(axis=(1, 2))

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.excitation.background import SETTINGS as BACKGROUND_SETTINGS
-from bench.excitation.family import Family, fans
+from bench.excitation.background import neighbours, term_rigs
+from bench.excitation.family import Family
 from bench.excitation.following import Follower
 from bench.excitation.information import INFORMATION_LIMITS, accumulate
 from bench.excitation.planner import SETTINGS as PLANNER_SETTINGS
@@ -22,36 +23,22 @@ class KnownRig:
         n_rigs: It and its neighbours, one for each parameter and term of a background.
     """
 
-    def __init__(
-        self,
-        family: Family,
-        x: NDArray[np.float64],
-        desk: Desk,
-        follower: Follower,
-        real: Family | None = None,
-    ) -> None:
+    def __init__(self, family: Family, x: NDArray[np.float64], desk: Desk, follower: Follower) -> None:
         """Run a rig over the record so far.
 
         Args:
-            family: Its hypothesis.
-            x: The rig ``(p,)``, standardised.
+            family: Its hypothesis, with its background where it has one, see `with_background`.
+            x: The rig ``(p,)``, standardised, without its background's coordinates.
             desk: What is allowed.
             follower: The record.
-            real: The hypothesis with a background, see `with_background`; None for none.
         """
         self._desk, self._own = desk, len(x)
-        terms = real.n_parameters - len(x) if real is not None else 0
-        self._step = BACKGROUND_SETTINGS.step if terms else INFORMATION_LIMITS.step
-        self._packs: list[Packed] = [family.packed(fans(x, self._step))]
-        if real is not None:
-            backed = real.packed(fans(np.append(x, np.zeros(terms)), self._step)[1 + len(x) :])
-            mine = backed.kernels.shape[1] - terms + np.arange(terms)
-            for rig, element in enumerate(
-                mine
-            ):  # in each rig one law of the background is there, and no other need run
-                backed.kernels[rig, mine[mine != element]] = 0
-            self._packs.append(backed)
-        self.n_rigs = 1 + len(x) + terms
+        self.n_rigs = 1 + family.n_parameters
+        backed = family.n_parameters > len(x)
+        self._step = BACKGROUND_SETTINGS.step if backed else INFORMATION_LIMITS.step
+        self._packs: list[Packed] = [neighbours(family, x, self._step)]
+        if backed:
+            self._packs.append(term_rigs(family, x, self._step))
         self._states = [packed.start[None].copy() for packed in self._packs]
         self._told = np.zeros((self.n_rigs - 1, self.n_rigs - 1))
         self._at = 0

@@ -95,8 +95,10 @@ class PacedPlanner:
         hypotheses = self.prior.hypotheses
         families = [Family(each, station.channels, station.actuators) for each in hypotheses]
         self.banks = tuple(map(Bank.of, families, self.prior.weights))
-        real = [with_background(each, self.background) for each in hypotheses] if self.background else []
-        self.real = tuple(Family(each, station.channels, station.actuators) for each in real)
+        self.real = tuple(families)
+        if self.background:
+            real = [with_background(each, self.background) for each in hypotheses]
+            self.real = tuple(Family(each, station.channels, station.actuators) for each in real)
         self.desk = Desk(station, 1)
         self.scale = np.array([station.scale[name] for name in station.channels])
         part = station.n_steps // station.n_knots
@@ -215,8 +217,7 @@ class PacedTest:
         if self.window >= self._next:
             self._identify()
             left -= self.follower.steps - before
-        rigs = 1 + self._planner.banks[self._kind].family.n_parameters + len(self._planner.background)
-        run = rigs * self.follower.length
+        run = (1 + self._planner.real[self._kind].n_parameters) * self.follower.length
         if self._rig is None and (left >= run or left == SETTINGS.work):
             self._rig, self.expected = self._known_rig(), None
             left -= run
@@ -241,9 +242,7 @@ class PacedTest:
     def _known_rig(self) -> KnownRig:
         found = self.follower.found[self._kind]
         assert found is not None
-        planner = self._planner
-        real = planner.real[self._kind] if planner.real else None
-        return KnownRig(planner.banks[self._kind].family, found.x, planner.desk, self.follower, real)
+        return KnownRig(self._planner.real[self._kind], found.x, self._planner.desk, self.follower)
 
     def _change_plan(self, rig: KnownRig, left: int) -> None:
         """Weigh the plan where that is not known, and changes of it, in so many steps of integration, and keep the best."""
