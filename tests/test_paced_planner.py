@@ -19,7 +19,7 @@ from bench.excitation.known_rig import KnownRig
 from bench.excitation.shaping import through_knots
 from bench.excitation.station import Desk
 from envs.background import background_of
-from envs.setups import sdof_setup
+from envs.setups import joint_setup, sdof_setup
 
 SETUP = sdof_setup()
 STATION = SETUP.station()
@@ -115,6 +115,25 @@ def test_it_leaves_less_than_its_opening_within_the_limits_and_from_what_is_meas
     np.testing.assert_allclose(runs.records.controls[:, :160], opening.records.controls[:, :160], atol=0.12)
     alone = run_policy(planner, family.packed(x[:1]), noise[:1])
     np.testing.assert_array_equal(alone.records.controls[0], runs.records.controls[0])
+
+
+@pytest.mark.parametrize("loads", [1, 2])
+def test_it_takes_two_loads_and_several_knots_a_window_in_a_short_test(loads: int) -> None:
+    setup = sdof_setup() if loads == 1 else joint_setup()
+    station = setup.station(n_windows=40, n_knots=2)
+    family = Family(setup.questions[0].hypotheses[0], station.channels, station.actuators)
+    planner = PacedPlanner(setup.questions[0], station, np.zeros((station.n_samples, loads)))
+    tests = planner.memory(2)
+    runs = run_policy(
+        planner,
+        family.packed(rigs(family, 2)),
+        disturbances(station, 2, np.random.default_rng(0)),
+        memory=tests,
+    )
+    assert all(test.window == 40 and test.weighed for test in tests)
+    assert np.all(np.any(runs.records.controls[:, 40:] != 0.0, axis=1))  # from an opening of nothing
+    assert np.max(runs.energy) <= 1.0 + 1e-9
+    assert np.max(runs.reached) <= 1.0
 
 
 def test_it_says_what_it_cannot_take() -> None:

@@ -209,7 +209,7 @@ class PacedTest:
 
     def _think(self) -> None:
         """A window's work: a step of identification where one is due, and changes of the plan as far as there is time."""
-        if self._looking and self.window != self._begin:
+        if self.window < self._begin or None in self.follower.found:
             self.follower.improve(self._turn % len(self.follower.found))
             self._turn += 1
             return
@@ -233,9 +233,8 @@ class PacedTest:
         first, self._kind = self._kind, next(iter(self.follower.log_odds()))
         if self._kind != first or (gain > 0.0 and kind == first):
             self._rig = None
-        soon = (
-            gain > self._planner.banks[kind].family.n_parameters
-        )  # more than noise makes of as many parameters
+        # a gain of more than noise makes of as many parameters is worth another step at once
+        soon = gain > self._planner.banks[kind].family.n_parameters
         later = max(self.window + 2, round((1.0 + SETTINGS.again) * self.window))
         self._next = self.window + 1 if soon else later
 
