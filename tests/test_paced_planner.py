@@ -64,6 +64,29 @@ def test_following_comes_to_what_an_identification_of_the_whole_record_finds(kin
         )  # at times far below: a record that grows leads past other valleys
 
 
+def test_what_is_cut_off_in_what_is_shown_misleads_nobody() -> None:
+    runs = run_commands(STATION, 1.6 * sweep(), FAMILIES[0].packed(rigs(FAMILIES[0], 4)), noise_of(4))
+    shown = np.array([0.04, 0.6, 3.0])  # of accelerations up to ten times that
+    assert np.max(np.abs(runs.records.measured[:, :, 2])) > 6.0
+    banks = tuple(map(Bank.of, FAMILIES, PRIOR.weights))
+    off = np.zeros((4, 2))
+    for i, x in enumerate(rigs(FAMILIES[0], 4)):
+        for k, limit in enumerate((shown, np.inf)):
+            follower = Follower(banks, NOISE, STATION.n_samples, 1, 0, limit)
+            for window in range(STATION.n_windows):
+                span = slice(4 * window, 4 * window + 4)
+                seen = np.clip(runs.records.measured[i, span], -shown, shown)
+                follower.append(runs.records.controls[i, span], seen)
+                if window < 60:
+                    follower.run_banks()
+                follower.improve(0)
+            found = follower.found[0]
+            assert found is not None
+            off[i, k] = np.sqrt(np.mean((found.x - x) ** 2))
+    assert np.max(off[:, 0]) < 0.1
+    assert np.mean(np.log(off[:, 0])) < np.mean(np.log(off[:, 1])) - 0.7
+
+
 def test_what_a_rest_is_expected_to_leave_is_what_planners_expect() -> None:
     family, x = FAMILIES[1], rigs(FAMILIES[1], 1)[0]
     knots = 0.4 * np.sin(np.linspace(0.0, 25.0, 120))[None, :, None]

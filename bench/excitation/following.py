@@ -93,6 +93,7 @@ class Alongside:
             self._packed, controls, self._states, members=np.arange(n)[None], counts=np.array([n]),
             timestep=self._timestep, clock=np.array([begin * self._timestep]),
         )  # fmt: skip
+        np.clip(outputs, -record.shown, record.shown, out=outputs)
         squares = np.empty((1, n))
         squared_residuals(outputs, measured, record.weights, np.array([record.length - begin]), squares)
         self.costs = self.costs + np.where(np.isfinite(squares[0]), squares[0], np.inf)
@@ -142,6 +143,7 @@ class Follower:
 
     Attributes:
         weights: One over the noise standard deviations ``(n_channels,)``.
+        shown: Largest magnitude that is shown of each channel ``(n_channels,)``; what is more is cut off, of rigs as of the record.
         controls: Commands so far ``(n_samples, n_actuators)``.
         measured: Channels so far ``(n_samples, n_channels)``.
         length: Samples so far.
@@ -156,6 +158,7 @@ class Follower:
         n_samples: int,
         n_actuators: int,
         seed: int = 0,
+        shown: NDArray[np.float64] | float = np.inf,
     ) -> None:
         """Begin a test.
 
@@ -165,8 +168,9 @@ class Follower:
             n_samples: Samples of the whole test.
             n_actuators: Actuators that are driven.
             seed: Seed of the rigs that are tried.
+            shown: Largest magnitude that is shown of each channel ``(n_channels,)``.
         """
-        self._banks, self.weights = banks, 1.0 / noise
+        self._banks, self.weights, self.shown = banks, 1.0 / noise, np.broadcast_to(shown, noise.shape)
         self.controls, self.measured = np.zeros((n_samples, n_actuators)), np.zeros((n_samples, len(noise)))
         self.length = self.steps = 0
         self.found: list[Found | None] = [None] * len(banks)

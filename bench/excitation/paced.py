@@ -166,7 +166,7 @@ class PacedTest:
         self.window, self.weighed = 0, 0
         self.plan = planner.plan.reshape(station.n_windows, station.width).copy()
         self.follower = Follower(
-            planner.banks, planner.desk.noise, station.n_samples, len(station.actuators), seed
+            planner.banks, planner.desk.noise, station.n_samples, len(station.actuators), seed, planner.scale
         )
         self.expected: float | None = None
         self._begin = round(SETTINGS.begin * station.n_windows)
