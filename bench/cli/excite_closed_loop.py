@@ -9,9 +9,6 @@ CLOSED_LOOP = (
     "(bench.excitation.Planner, PacedPlanner, find_policy); replayed open-loop on another rig it need not keep the limits"
 )
 
-WIDE = 1e4
-"""Scale of what is observed, in deviations of its noise, where no limit gives it."""
-
 
 def from_policy(asked: Any, name: str, rng: Any) -> tuple[Any, list[str]]:
     """What a policy does on the rig as it is described, and what the reader must know of it."""
@@ -115,12 +112,11 @@ def from_rival_planner(asked: Any, rng: Any) -> tuple[Any, list[str]]:
 
 def _station(asked: Any, n_steps: int, n_windows: int) -> Any:
     from bench.excitation import Station
+    from bench.excitation.paced import SETTINGS
 
     experiment = asked.experiment
-    # of 32-bit numbers up to one: wide enough to cut nothing off, and finer than a hundredth of the noise
-    scale = {
-        name: WIDE * deviation for name, deviation in experiment.noise.items()
-    } | experiment.limits.watched
+    wide = {name: SETTINGS.wide * deviation for name, deviation in experiment.noise.items()}
+    scale = wide | experiment.limits.watched
     return Station(
         experiment.noise, scale, experiment.limits, experiment.timestep, n_steps, n_windows, asked.band
     )

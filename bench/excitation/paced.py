@@ -54,6 +54,9 @@ class PacedSettings:
     the fourth root, so that it stays where a fifth succeed."""
     local: float = 0.7
     """Of the changes are under a bell in time, as wide as three knots or anything up to the whole rest."""
+    wide: float = 1e4
+    """Scale of a channel without a limit, in deviations of its noise, where a station is made for a planner: observations are numbers of
+    32 bits up to one, which are finer than a hundredth of the noise then, and nothing is cut off."""
 
 
 SETTINGS = PacedSettings()
