@@ -168,7 +168,7 @@ def test_it_says_what_it_cannot_take() -> None:
     seen = np.zeros((2, STATION.n_observations), dtype=np.float32)
     with pytest.raises(ParameterError, match="observations of length"):
         planner.act(seen[:, :-1], planner.memory(2))
-    with pytest.raises(ParameterError, match=r"memory = planner\.memory"):
+    with pytest.raises(ParameterError, match=r"memory = policy\.memory"):
         planner.act(seen)
     memory = planner.memory(2)
     for test in memory:

@@ -74,7 +74,8 @@ def from_paced(asked: Any, opening: Any, rng: Any) -> tuple[Any, list[str]]:
 def _of_paced(planner: Any, test: Any, window: float) -> list[str]:
     """What a paced planner knows at the end of a test."""
     notes = [f"decided every {window:g} s, {test.weighed} plans weighed in all"]
-    for kind in list(test.follower.log_odds())[:1]:
+    kind = next(iter(test.follower.log_odds()), None)
+    if kind is not None:
         family = planner.banks[kind].family
         values = zip(family.hypothesis.names, family.values(test.follower.found[kind].x), strict=True)
         notes.append("found at the end: " + ", ".join(f"{name} {value:.4g}" for name, value in values))

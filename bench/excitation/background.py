@@ -99,6 +99,22 @@ def expected_error(information: NDArray[np.float64], score: NDArray[np.float64])
     return np.sqrt(square / p)
 
 
+def bare_and_backed(
+    information: NDArray[np.float64], score: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Errors that identification is expected to leave without a background and over all of them ``(k,)``, at most one.
+
+    Args:
+        information: ``F = J'J`` ``(k, p, p)``.
+        score: ``J'D`` ``(k, p, n_terms)``, see `errors_left`.
+    """
+    p = information.shape[1]
+    covariance = np.linalg.inv(np.eye(p) + information)
+    spread = np.trace(covariance, axis1=1, axis2=2)
+    bias = np.sum((covariance @ score) ** 2, axis=(1, 2))
+    return np.sqrt(np.minimum(spread / p, 1.0)), np.sqrt(np.minimum((spread + bias) / p, 1.0))
+
+
 def neighbours(real: Family, x: NDArray[np.float64], step: float) -> Packed:
     """A rig, and it moved by a step along one coordinate after the other, all without the laws of a background.
 
@@ -170,8 +186,4 @@ def errors_left(
     information, score = slopes @ slopes.transpose(0, 2, 1), slopes @ terms.transpose(0, 2, 1)
     known = np.isfinite(information).all(axis=(1, 2)) & np.isfinite(score).all(axis=(1, 2))
     information[~known], score[~known] = 0.0, 0.0
-    covariance = np.linalg.inv(np.eye(p) + information)
-    spread = np.trace(covariance, axis1=1, axis2=2)
-    bias = np.sum((covariance @ score) ** 2, axis=(1, 2))
-    bare, backed = (np.sqrt(np.minimum(square / p, 1.0)) for square in (spread, spread + bias))
-    return ErrorsLeft(y[:, 0], bare, backed)
+    return ErrorsLeft(y[:, 0], *bare_and_backed(information, score))

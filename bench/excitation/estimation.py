@@ -96,8 +96,8 @@ def squared_residuals(outputs, measured, weights, lengths, squares):
 
 
 @numba.njit(cache=True, error_model="numpy", nogil=True)
-def add_normal_equations(outputs, measured, weights, lengths, step, fisher, score):
-    """Add ``J'J`` and ``J'r`` from records of rigs and their perturbed ones."""
+def _normal(outputs, measured, weights, lengths, step, fisher, score):
+    """``J'J`` and ``J'r`` from records of rigs and their perturbed ones."""
     p = outputs.shape[1] - 1
     row = np.zeros(p)
     for m in range(outputs.shape[0]):
@@ -140,7 +140,7 @@ def normal_equations(
     for first in range(0, m, size):
         rows = slice(first, first + size)
         outputs = family.record(fans(coordinates[rows], INFORMATION_LIMITS.step), records.controls[rows])
-        add_normal_equations(
+        _normal(
             outputs, records.measured[rows], 1.0 / noise, records.lengths[rows], INFORMATION_LIMITS.step, fisher[rows], score[rows]
         )  # fmt: skip
     return fisher, score

@@ -74,9 +74,7 @@ class Family:
             change = np.diag(values[1:-1] - values[0])[:, None]
             self._slopes[name] = (rows[1:-1] - rows[0]).reshape(p, -1) / change
         self._middle = values[0]
-        self._packed = packed._replace(
-            **{name: array[:1] for name, array in packed._asdict().items() if name not in {"rows", "columns"}}
-        )
+        self._packed = packed.alone(0)
         found = self.packed(check[None])
         for name in _AFFINE:
             given, ours = getattr(packed, name)[-1], getattr(found, name)[0]

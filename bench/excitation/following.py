@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 
 from bench.excitation.estimation import (
     ESTIMATION_SETTINGS,
-    add_normal_equations,
     spread_points,
     squared_residuals,
 )
 from bench.excitation.family import Family, fans
-from bench.excitation.information import INFORMATION_LIMITS
+from bench.excitation.information import INFORMATION_LIMITS, accumulate
 from bench.excitation.stepping import Packed, integrate_cases
 
 
@@ -103,14 +102,10 @@ class Alongside:
     def best(self) -> Alongside:
         """The rig of the least cost alone, where it is."""
         i = int(np.argmin(self.costs))
-        rows = {name: rows[i : i + 1] for name, rows in self._packed._asdict().items() if name in _BY_RIG}
-        alone = Alongside(self.points[i : i + 1], self._packed._replace(**rows), self._timestep)
+        alone = Alongside(self.points[i : i + 1], self._packed.alone(i), self._timestep)
         alone.costs, alone._length = self.costs[i : i + 1], self._length
         alone._states = self._states[:, i : i + 1].copy()
         return alone
-
-
-_BY_RIG = tuple(name for name in Packed._fields if name not in {"rows", "columns"})
 
 
 @dataclass(eq=False)
@@ -226,16 +221,22 @@ class Follower:
         p, n = family.n_parameters, self.length
         x, step = found.x, INFORMATION_LIMITS.step
         _, outputs = self._from_rest(family, fans(x, step))
-        information, score = np.zeros((1, p, p)), np.zeros((1, p))
-        add_normal_equations(
-            outputs, self.measured[None, :n], self.weights, np.array([n]), step, information, score
+        fisher, scores, unused = (
+            np.zeros((1, 1, p, p)),
+            np.zeros((1, 1, p)),
+            (np.zeros((1, 1)), np.zeros((1, 1))),
         )
+        counts = np.array([[p]])
+        accumulate(
+            0, 1, outputs, counts, step, self.weights, self.measured[None, :n], fisher, scores, *unused
+        )
+        information, score = fisher[0, 0], scores[0, 0]
         if not (np.isfinite(information).all() and np.isfinite(score).all()):
             return
-        inner = information[0] + np.eye(p)
+        inner = information + np.eye(p)
         dampings = found.damping * ESTIMATION_SETTINGS.dampings
         damped = inner + dampings[:, None, None] * (inner * np.eye(p))
-        moves = np.linalg.solve(damped, np.broadcast_to((score[0] - x)[:, None], (len(dampings), p, 1)))
+        moves = np.linalg.solve(damped, np.broadcast_to((score - x)[:, None], (len(dampings), p, 1)))
         moves = moves[..., 0]
         freedom = n * len(self.weights)
         if found.cost > freedom + SETTINGS.unexplained * np.sqrt(2.0 * freedom):

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.excitation.background import SETTINGS as BACKGROUND_SETTINGS
-from bench.excitation.background import neighbours, term_rigs
+from bench.excitation.background import bare_and_backed, neighbours, term_rigs
 from bench.excitation.family import Family
 from bench.excitation.following import Follower
 from bench.excitation.information import INFORMATION_LIMITS, accumulate
 from bench.excitation.planner import SETTINGS as PLANNER_SETTINGS
+from bench.excitation.planner import smaller
 from bench.excitation.shaping import through_knots
 from bench.excitation.station import Desk
 from bench.excitation.stepping import Packed, integrate_cases
@@ -109,16 +110,10 @@ class KnownRig:
         first = self._states[0][:, :1].repeat(len(knots), axis=0)
         over = reached(self._alone(many, self._packs[0], first))
         if over.max() > 1.0:
-            knots = knots * np.where(over > 1.0, np.clip(0.97 / over, 0.3, 0.97), 1.0)[:, None, None]
+            knots = knots * np.where(over > 1.0, smaller(over), 1.0)[:, None, None]
             many = commands(knots)
         outputs = self._run(many, [states.repeat(len(knots), axis=0) for states in self._states])
         over = reached(outputs)
-        error = self._error(self._told + self._information(outputs))
+        told, p = self._told + self._information(outputs), self._own
+        _, error = bare_and_backed(told[:, :p, :p], told[:, :p, p:])
         return np.where(over > 1.0, 1.0 + over, error), knots
-
-    def _error(self, information: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Expected error of the parameters ``(k,)``, over all backgrounds; see `bench.excitation.background.errors_left`."""
-        p = self._own
-        covariance = np.linalg.inv(np.eye(p) + information[:, :p, :p])
-        bias = np.sum((covariance @ information[:, :p, p:]) ** 2, axis=(1, 2))
-        return np.sqrt(np.minimum((np.trace(covariance, axis1=1, axis2=2) + bias) / p, 1.0))

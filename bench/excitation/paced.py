@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
+from bench.excitation.acting import check_window, rows_of
 from bench.excitation.background import BackgroundTerm, with_background
 from bench.excitation.family import Family
 from bench.excitation.following import Bank, Follower
@@ -125,7 +126,7 @@ class PacedPlanner:
         return [PacedTest(self, self.seed + i) for i in range(int(np.prod(shape, dtype=int)))]
 
     def act(self, observation: NDArray[np.float32], memory: Any = None) -> NDArray[np.float32]:
-        """Actions ``(…, width)`` in −1 … 1 for observations ``(…, n_observations)``; takes below a millisecond a test.
+        """Actions ``(…, width)`` in −1 … 1 for observations ``(…, n_observations)``; with one load in about a millisecond a test.
 
         Args:
             observation: What was seen of the last window.
@@ -135,20 +136,9 @@ class PacedPlanner:
             ParameterError: The observations have another length, no memory came, or the test is over.
         """
         observation = np.asarray(observation, dtype=np.float32)
-        station, before = self.station, observation.shape[:-1]
-        if observation.shape[-1] != station.n_observations:
-            raise ParameterError(
-                f"{self.name} was made for observations of length {station.n_observations}; {observation.shape} came"
-            )
-        if memory is None or len(memory) != np.prod(before, dtype=int):
-            came = "none" if memory is None else f"one of {len(memory)} tests"
-            raise ParameterError(
-                f"{self.name} remembers the record, and {came} came as its memory; take memory = planner.memory({before}) at the "
-                "start of a test and act(observation, memory) in it"
-            )
-        rows = observation.reshape(-1, observation.shape[-1])
+        rows = rows_of(self, observation, None if memory is None else len(memory))
         actions = np.array([test.act(row) for test, row in zip(memory, rows, strict=True)], dtype=np.float32)
-        return actions.reshape(*before, station.width)
+        return actions.reshape(*observation.shape[:-1], self.station.width)
 
 
 class PacedTest:
@@ -181,11 +171,7 @@ class PacedTest:
 
     def act(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """The action of the next window ``(width,)`` for what was seen of the last ``(n_observations,)``."""
-        station = self._planner.station
-        if self.window >= station.n_windows:
-            raise ParameterError(
-                f"{self._planner.name} has tests of {station.n_windows} windows, which are over; begin anew with memory()"
-            )
+        check_window(self._planner, self.window)
         if self.window:  # what is seen first is the rest before the test
             self._see(observation)
         if self.window >= self._first:

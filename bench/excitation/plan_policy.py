@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import ParameterError
+from bench.excitation.acting import check_window, rows_of
 from bench.excitation.archive import FORMAT, write_archive
 from bench.excitation.recurrence import frozen
 from bench.excitation.station import Station
@@ -189,30 +190,16 @@ class PlanPolicy:
             ParameterError: The observations have another length, no memory came, or the test is over.
         """
         observation = np.asarray(observation, dtype=np.float32)
-        station, before = self.station, observation.shape[:-1]
-        if observation.shape[-1] != station.n_observations:
-            raise ParameterError(
-                f"policy '{self.name}' was trained on observations of length {station.n_observations}; {observation.shape} came"
-            )
-        if memory is None or len(memory.record) != np.prod(before, dtype=int):
-            came = "none" if memory is None else f"one of {len(memory.record)} tests"
-            raise ParameterError(
-                f"policy '{self.name}' remembers the record, and {came} came as its memory; take memory = policy.memory({before}) "
-                "at the start of a test and act(observation, memory) in it"
-            )
-        window = memory.seen
-        if window >= station.n_windows:
-            raise ParameterError(
-                f"policy '{self.name}' has tests of {station.n_windows} windows, which are over; begin anew with policy.memory()"
-            )
-        rows = observation.reshape(-1, observation.shape[-1])
+        station, window = self.station, memory.seen if memory is not None else 0
+        rows = rows_of(self, observation, None if memory is None else len(memory.record))
+        check_window(self, window)
         if window:  # what is seen first is the rest before the test
             memory.record[:, window - 1] = entries(station, rows)
         for stage in self.stages:
             if stage.window == window:
                 self._decide(stage, memory)
         memory.seen += 1
-        return np.clip(memory.actions[:, window], -1.0, 1.0).reshape(*before, station.width)
+        return np.clip(memory.actions[:, window], -1.0, 1.0).reshape(*observation.shape[:-1], station.width)
 
     def _decide(self, stage: PlanStage, memory: PlanMemory) -> None:
         record = memory.record[:, : stage.window].reshape(len(memory.record), -1)

@@ -194,7 +194,7 @@ class Planner(SequentialPlanner):
             over[wide] = True
             if not wide.size:
                 break
-            rests[wide] *= np.clip(0.97 / reached[reached > 1.0], 0.3, 0.97)[:, None, None]
+            rests[wide] *= smaller(reached[reached > 1.0])[:, None, None]
         whole[:, begin:] = rests
         if self.background:
             left = errors_left(self.real[kind], x, whole, self.desk.noise)
@@ -206,3 +206,8 @@ class Planner(SequentialPlanner):
         information = np.where(np.isfinite(information), information, 0.0)
         remaining = np.trace(np.linalg.inv(np.eye(len(x)) + information), axis1=1, axis2=2) / len(x)
         return np.where(over, 1.0, np.sqrt(remaining)), rests
+
+
+def smaller(reached: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Factors by which signals that reach more than one of a limit are made smaller: a little more than in proportion."""
+    return np.clip(0.97 / reached, 0.3, 0.97)

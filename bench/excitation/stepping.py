@@ -51,6 +51,11 @@ class Packed(NamedTuple):
     theta: NDArray[np.float64]  # (D, K, n_theta)
     start: NDArray[np.float64]  # (D, 2 nv + nz)
 
+    def alone(self, i: int) -> Packed:
+        """One member."""
+        rows = self._asdict().items()
+        return self._replace(**{name: a[i : i + 1] for name, a in rows if name not in {"rows", "columns"}})
+
 
 @numba.njit(error_model="numpy", inline="always")
 def _affine(row, constants, coefficients, rows, columns, values):

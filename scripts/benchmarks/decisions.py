@@ -77,10 +77,7 @@ def _row(name: str, policy: ActingPolicy, rigs: Packed, repeats: int) -> Row:
     late, middle = [], []
     for i in range(repeats + 1):
         timed = Timed(policy)
-        one = rigs._replace(
-            **{key: rows[i : i + 1] for key, rows in rigs._asdict().items() if key not in {"rows", "columns"}}
-        )
-        run_policy(timed, one, disturbances(policy.station, 1, np.random.default_rng(i)))
+        run_policy(timed, rigs.alone(i), disturbances(policy.station, 1, np.random.default_rng(i)))
         if i:
             late.append(1e3 * float(np.percentile(timed.seconds, 95)))
             middle.append(1e3 * float(np.median(timed.seconds)))
